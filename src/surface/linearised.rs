@@ -100,8 +100,8 @@ impl SpotField {
         let lifetime_d = self.spot_lifetime_d.filter(|days| *days < Parameter::SpotLifetime.usual())?;
         self.at_bounds.iter().any(|reached| reached == name).then(|| {
             format!(
-                "{name} is at its lower search bound, {lifetime_d:.2} d: maps that vary between profiles absorb any signal, \
-                planets included. Likely causes: star.rotation_period_d; underestimated uncertainties \
+                "{name} is at its lower search bound, {lifetime_d:.2} d: maps that vary between profiles absorb any \
+                signal, planets included. Likely causes: star.rotation_period_d; underestimated uncertainties \
                 (observations.sigma_scale: \"auto\"); a variable continuum or line (imaging.nuisances)"
             )
         })
@@ -112,8 +112,8 @@ impl SpotField {
         let SpotField { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
         let life = self.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2} d"));
         format!(
-            "spots (marginalised): amplitude {spot_amplitude:.3}, power-law index {spot_slope:.2} ({}), lifetime {life}; \
-            RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",
+            "spots (marginalised): amplitude {spot_amplitude:.3}, power-law index {spot_slope:.2} ({}), \
+            lifetime {life}; RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",
             self.spectrum()
         )
     }

@@ -241,8 +241,8 @@ fn one_star() {
     says(&alone.texts[3], &["porb_over_prot is unconstrained", "phi is unconstrained", "consistent with zero"]);
 }
 
-/// A rotation period that is off by a tenth is named, with the right one, and no planet is claimed; the right one is not
-/// doubted.
+/// A rotation period that is off by a tenth is named, with the right one, and no planet is claimed; the right one is
+/// not doubted.
 #[test]
 fn a_wrong_rotation_period_is_named() {
     let star = Star { spots: few(), vsini_kms: 20.0, nights: (8, 2), ..PLAIN };

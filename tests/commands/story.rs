@@ -89,7 +89,8 @@ fn told(star: &str, seed: u64) -> (String, Vec<String>) {
         check(k_off.abs() < 0.3 && p_off.abs() < 0.3, format!("K {k_off:.2}, P {p_off:.2} sigma apart"));
     }
     let row = format!(
-        "| {star} {seed} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {ln_b:.1} | {:.3} +- {:.3} | {:.3} | {:.2} +- {:.2} | {:.2} | {} | {:.0} |",
+        "| {star} {seed} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {ln_b:.1} | {:.3} +- {:.3} | {:.3} | {:.2} +- {:.2} | \
+        {:.2} | {} | {:.0} |",
         findings[0],
         findings[1],
         faps[0],
@@ -112,8 +113,8 @@ fn told(star: &str, seed: u64) -> (String, Vec<String>) {
 #[ignore = "by hand: an hour"]
 fn by_hand_every_command_agrees() {
     println!(
-        "| star | search | chain | FAP: search | limits | chain | ln B | K: search | chain | P: search | chain | steps | \
-         s |"
+        "| star | search | chain | FAP: search | limits | chain | ln B | K: search | chain | P: search | chain | \
+        steps | s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     let mut apart = Vec::new();

@@ -4,7 +4,7 @@
 //! parameters) and T's first columns the velocities of unit orbits (`planet`): of a circle the cosine and sine of its
 //! angle. Then `ln L = c + b y - y A y / 2`.
 
-use super::interpolation::Interpolation;
+use super::interpolation::{Interpolation, Pieces};
 use super::planet::{Nonlinear, Planet};
 use crate::model::{Elements, Parameter, ParameterSpace, Prior};
 use crate::surface::expansion::Expansion;
@@ -22,16 +22,6 @@ pub(super) struct Given {
     pub planets: Vec<Nonlinear>,
     /// The sampling coordinates that expansions are interpolated over; empty where there is one expansion.
     pub field: DVector<f64>,
-}
-
-/// ln L without orbits: `constant + gradient x - x information x / 2`.
-#[derive(Clone, Debug)]
-pub(super) struct Pieces {
-    pub constant: f64,
-    pub gradient: DVector<f64>,
-    pub information: DMatrix<f64>,
-    /// The information times the columns of T that are not orbits.
-    pub informed: DMatrix<f64>,
 }
 
 /// Where the pieces come from.

@@ -4,13 +4,22 @@
 //! coordinates in which the places scatter alike in all directions. It is exact at the places, and everywhere for
 //! quadratics.
 
-use super::conditional::Pieces;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngCore};
 use rand_distr::{ChiSquared, StandardNormal};
 
 /// Degrees of freedom of the distribution that places are drawn from.
 const DEGREES: f64 = 8.0;
+
+/// ln L without orbits: `constant + gradient x - x information x / 2`.
+#[derive(Clone, Debug)]
+pub(super) struct Pieces {
+    pub constant: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+    /// The information times the columns of T that are not orbits.
+    pub informed: DMatrix<f64>,
+}
 
 /// Pieces between places.
 #[derive(Clone, Debug)]
