@@ -130,8 +130,8 @@ fn words(cost: &Cost) -> String {
     let each = of_a_step.as_secs_f64() / evaluations as f64;
     let bound = if is_limit { "at most" } else { "some" };
     format!(
-        "the chain takes {bound} {steps} steps of {evaluations} evaluations, {each:.2} s each with all threads: {time:#}; \
-        it ends when every parameter has reached its goals"
+        "the chain takes {bound} {steps} steps of {evaluations} evaluations, {each:.2} s each with all threads: \
+        {time:#}; it ends when every parameter has reached its goals"
     )
 }
 

@@ -94,8 +94,8 @@ impl EvidenceRecord {
         let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
             let most = one.k.1[1];
             format!(
-                "The prior of K reaches to {most} km/s, far beyond σ_K ≈ {error_kms:.3} km/s, and lowers all Bayes factors \
-                in proportion. "
+                "The prior of K reaches to {most} km/s, far beyond σ_K ≈ {error_kms:.3} km/s, and lowers all Bayes \
+                factors in proportion. "
             )
         });
         let jitter = if !jitters.is_none() { ", RV jitter marginalised" } else { "" };

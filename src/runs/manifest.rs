@@ -91,8 +91,8 @@ impl Manifest {
         })?;
         let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
         Some(format!(
-            "The period lies within {:.0} % of {rotation}, where it is degenerate with spot modulation: the interval of K \
-            is too narrow; compare with `dimcmc periodogram` or imaging.unresolved_spots: \"fitted\".",
+            "The period lies within {:.0} % of {rotation}, where it is degenerate with spot modulation: the \
+            interval of K is too narrow; compare with `dimcmc periodogram` or imaging.unresolved_spots: \"fitted\".",
             100.0 * NEAR_ROTATION
         ))
     }

@@ -86,8 +86,8 @@ impl Detection {
         let shortest = self.frequencies.rotation_period_d / self.frequencies.range().1;
         if shortest > self.frequencies.rotation_period_d {
             remarks.push(Remark::note(format!(
-                "The search starts at {shortest:.3} d, above P_rot = {:.3} d: spot signals at P_rot and its harmonics appear \
-                only as aliases; use --min-period-d.",
+                "The search starts at {shortest:.3} d, above P_rot = {:.3} d: spot signals at P_rot and its \
+                harmonics appear only as aliases; use --min-period-d.",
                 self.frequencies.rotation_period_d
             )));
         }
@@ -109,16 +109,16 @@ impl Detection {
             remarks.push(Remark::against(
                 "systemic velocity may be wrong",
                 format!(
-                    "An RV offset of {velocity_kms:+.3} ± {sigma_kms:.3} km/s raises ln L by {gain:.0}: star.vsys_kms may be \
-                    wrong, which produces spurious peaks; free vsys_kms under parameters."
+                    "An RV offset of {velocity_kms:+.3} ± {sigma_kms:.3} km/s raises ln L by {gain:.0}: \
+                    star.vsys_kms may be wrong, which produces spurious peaks; free vsys_kms under parameters."
                 ),
             ));
         }
         let turns = imager.time_base_cycles();
         if turns < 1.0 {
             remarks.push(Remark::note(format!(
-                "The data span only {turns:.2} rotations: parts of the surface are unseen, or star.rotation_period_d (days) \
-                is wrong."
+                "The data span only {turns:.2} rotations: parts of the surface are unseen, or \
+                star.rotation_period_d (days) is wrong."
             )));
         }
         let profiles = imager.profiles().count();
@@ -126,8 +126,8 @@ impl Detection {
             remarks.push(Remark::against(
                 "few profiles",
                 format!(
-                    "Only {profiles} profiles: the unresolved-spot noise is poorly constrained; expect reduced sensitivity \
-                    and approximate uncertainties."
+                    "Only {profiles} profiles: the unresolved-spot noise is poorly constrained; expect reduced \
+                    sensitivity and approximate uncertainties."
                 ),
             ));
         }

@@ -19,8 +19,8 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
         remarks.push(Remark::against(
             "highest peak outside the period prior",
             format!(
-                "The highest peak, P = {period_d:.digits$} d, lies outside the period prior and may alias into it: widen \
-                the prior."
+                "The highest peak, P = {period_d:.digits$} d, lies outside the period prior and may alias into it: \
+                widen the prior."
             ),
         ));
         if verdict.finding != Finding::NotJudged {

@@ -169,8 +169,8 @@ impl RunSummary {
         let period = period_prior(&settings.free, &Elements::PLANETS[0], clock);
         if let Some(shortest) = period.map(|prior| prior.bounds().0).filter(|shortest| *shortest > 1.0) {
             remarks.push(Remark::note(format!(
-                "The period prior starts at {shortest:.4} P_rot: spot signals at P_rot and its harmonics appear only as \
-                aliases."
+                "The period prior starts at {shortest:.4} P_rot: spot signals at P_rot and its harmonics appear \
+                only as aliases."
             )));
         }
         remarks
