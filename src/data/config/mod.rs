@@ -22,7 +22,7 @@ pub use settings::{
 };
 pub use written::{
     Automatic, EquivalentWidth, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line,
-    LineShape, ObservationsSection, OfField, OutlierTreatment, PlanSection, SimulatedLight, Star, USUAL_LIMB_DARKENING,
+    LineShape, Listed, ObservationsSection, OfField, OutlierTreatment, PhotometrySection, PlanSection, SEGMENT_GAP_D, SimulatedLight, Star, USUAL_LIMB_DARKENING,
     USUAL_WAVELENGTH_NM, VelocityJitter, ZeroPoint,
 };
 
