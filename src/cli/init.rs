@@ -163,7 +163,8 @@ impl KnownArgs {
     /// own.
     fn of_lists(name: &str, values: &[f64], lists: usize) -> Result<Vec<Option<Given<f64>>>, Failure> {
         if values.len() > 1 && values.len() != lists {
-            let problem = format!("{name}: {} values, and {lists} of what they are for: give one, or one each", values.len());
+            let problem =
+                format!("{name}: {} values, and {lists} of what they are for: give one, or one each", values.len());
             return Err(Failure::input(problem));
         }
         if let Some(value) = values.iter().find(|value| !value.is_finite()) {

@@ -150,7 +150,8 @@ impl Diagnosis {
         let parts = of_sets(&scene.imager, &scene.whole_over_continuum());
         let several = parts.len() > 1;
         parts.iter().zip(&scene.settings.sets).find_map(|(part, set)| {
-            let double = DoubleLines::of(part, set.star.line.sigma_kms).map(|lines| (Reason::DoubleLines, lines.text()));
+            let double =
+                DoubleLines::of(part, set.star.line.sigma_kms).map(|lines| (Reason::DoubleLines, lines.text()));
             let variances = || Some((Reason::Variances, by_neighbours(part).and_then(|(q, f)| variances(q, f))?));
             let (reason, text) = double.or_else(variances)?;
             let text = if several { format!("{}: {text}", set.name) } else { text };

@@ -3,8 +3,8 @@
 
 use super::document::compact;
 use super::written::{
-    ImagingSettings, Instrument, Listed, ObservationsSection, PerParameter, PhotometrySection, Planet, PriorSection, Star,
-    VelocityJitter,
+    ImagingSettings, Instrument, Listed, ObservationsSection, PerParameter, PhotometrySection, Planet, PriorSection,
+    Star, VelocityJitter,
 };
 use crate::model::{Parameter, PriorKind};
 use serde::Serialize;

@@ -97,7 +97,10 @@ impl Ledger {
 
     /// The same of the first data set, and all that it says of the star.
     pub fn take_first(&mut self, other: Ledger) {
-        let own = |entry: Entry| Entry { key: of_set(&entry.key, 0).filter(|_| entry.key != INSTRUMENT).unwrap_or(entry.key), ..entry };
+        let own = |entry: Entry| Entry {
+            key: of_set(&entry.key, 0).filter(|_| entry.key != INSTRUMENT).unwrap_or(entry.key),
+            ..entry
+        };
         self.entries.extend(other.entries.into_iter().map(own));
     }
 

@@ -74,8 +74,13 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let mut notes = Vec::new();
     for (set, list) in sets.iter().zip(&place.lists) {
         let of = list.name.as_ref().filter(|_| several).map_or_else(String::new, |name| format!("{name}: "));
-        let own = set.profiles.remarks.iter().map(|remark| format!("profiles: {of}{remark}"));
-        notes.extend(own.chain(variances(&set.whole, &set.values.look.noise).map(|text| format!("{of}{text}"))));
+        notes.extend(set.profiles.remarks.iter().map(|remark| format!("profiles: {of}{remark}")));
+        let Some(text) = variances(&set.whole, &set.values.look.noise) else { continue };
+        // by the continuum they are scaled; without it maps would follow the noise, for ages
+        if set.values.look.noise.ratio().is_none() && known.sigma_scale.is_none() {
+            return Err(ProposalError::Variances { list: list.list.into(), text });
+        }
+        notes.push(format!("{of}{text}"));
     }
     notes.extend(sets[0].values.notes(known, sets.iter().map(|set| set.whole.profiles.len()).sum()));
     notes.iter().for_each(|note| say(note));

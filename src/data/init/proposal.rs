@@ -85,6 +85,14 @@ pub enum ProposalError {
         /// The likely reason, by trying.
         reason: String,
     },
+    /// Uncertainties that are variances, and no continuum to scale them by.
+    #[error("{}: {text}", .list.display())]
+    Variances {
+        /// The list of profiles.
+        list: PathBuf,
+        /// What they are.
+        text: String,
+    },
     /// No map can be made of the profiles with these values.
     #[error("{}: `map` would find no maps of these profiles{status}: {reason}", .list.display())]
     NoMaps {

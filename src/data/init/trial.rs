@@ -346,8 +346,7 @@ impl Trial {
     pub fn notes(&self, draft: &Draft) -> Vec<String> {
         let vsini = self.measured_vsini.then(|| {
             format!(
-                "no map fits with the given vsini, and one does much better with that of the mean profile, which is \
-                written: {} km/s",
+                "maps fit much better with the vsini of the mean profile than with the given one: {} km/s is written",
                 draft.star.vsini_kms
             )
         });

@@ -104,14 +104,7 @@ impl Values {
         }
         let line_sigma_kms = line::sigma_kms(&look, model, known, ledger);
         let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms(), known, ledger);
-        Ok(Values {
-            look,
-            velocity_range_kms,
-            continuum_level,
-            line_sigma_kms,
-            resolving_power,
-            limb_darkening,
-        })
+        Ok(Values { look, velocity_range_kms, continuum_level, line_sigma_kms, resolving_power, limb_darkening })
     }
 
     /// What other data sets say of the star as well: vsini and local line become the means of all, weighted by their
@@ -137,7 +130,13 @@ impl Values {
     }
 
     /// The config's values, from the profiles of each data set within the velocity range.
-    pub fn draft(&self, cuts: &[&Observations], light: Vec<PhotometrySection>, known: &Known, ledger: &mut Ledger) -> Draft {
+    pub fn draft(
+        &self,
+        cuts: &[&Observations],
+        light: Vec<PhotometrySection>,
+        known: &Known,
+        ledger: &mut Ledger,
+    ) -> Draft {
         let look = &self.look;
         let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
         let rotation_period_d = self.rotation_period(known, ledger);
@@ -267,12 +266,16 @@ impl Values {
     pub fn note_errors(&self, known: &Known, measured: Option<&MeasuredErrors>, ledger: &mut Ledger) {
         let noise = &self.look.noise;
         let auto = match (measured, noise.scatter) {
+            (Some(measured), _) if measured.sigma_scale.is_none() => measured.line(),
             (Some(measured), _) => format!("measured by every command: {}", measured.line()),
             (None, Some(scatter)) => {
                 format!(
                     "measured by every command: quoted errors are {:.1e}, the continuum scatters by {scatter:.1e}",
                     noise.quoted
                 )
+            }
+            (None, None) if known.objective().properties().map_changes => {
+                format!("as quoted, {:.1e}: {}", noise.quoted, noise::NO_CONTINUUM)
             }
             (None, None) => {
                 format!("measured by every command: quoted errors are {:.1e}, by a map alone", noise.quoted)

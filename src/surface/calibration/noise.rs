@@ -104,7 +104,7 @@ impl NoiseError {
 }
 
 /// What is missing where errors are not measured, and how to give it.
-const NO_CONTINUUM: &str = "too little continuum beside the line to measure them by. Give profiles that reach farther, or \
+pub const NO_CONTINUUM: &str = "too little continuum beside the line to measure them by. Give profiles that reach farther, or \
      observations.sigma_scale as a number";
 
 /// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: errors are good to 13 and

@@ -308,8 +308,15 @@ impl<'a> Fit<'a> {
         let line_errors_kms = (line_sigma_kms * by_width, by_vsini);
         let bins = self.weights.iter().sum::<f64>().max(1.0);
         let residual = (here.residual.iter().map(|r| r * r).sum::<f64>() / bins).sqrt();
-        let star =
-            Unspotted { vsini_kms, centre_kms, equivalent_width_kms, offset, line_sigma_kms, line_errors_kms, residual };
+        let star = Unspotted {
+            vsini_kms,
+            centre_kms,
+            equivalent_width_kms,
+            offset,
+            line_sigma_kms,
+            line_errors_kms,
+            residual,
+        };
         Ok((star, self.unexplained(&here)))
     }
 
