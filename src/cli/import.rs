@@ -4,7 +4,7 @@ use super::init::{KnownArgs, next_commands};
 use super::output::{ConfigFile, folder_of};
 use super::{Failure, Global, console, progress};
 use crate::data::import::Import;
-use crate::data::init::{Place, propose};
+use crate::data::init::{List, Place, propose};
 use crate::data::io::atomic;
 use crate::data::io::zdipy::{Input, LINE_FILE, LocalLineFile};
 use crate::numerics::text::shown;
@@ -39,13 +39,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.spare(&files(args, &input), Some(&list))?;
     let folder = args.output.relative(folder_of(&args.input))?;
     let import = Import::zdipy(&input, line.as_ref(), &folder).map_err(Failure::of)?;
-    let place = Place {
-        config,
+    args.known.check_single()?;
+    let own = List {
         list: &list,
         list_bytes: import.list.as_bytes(),
         list_in_config: PathBuf::from(list.file_name().unwrap_or_default()),
-        schema: args.output.schema(),
+        name: None,
+        resolving_power: None,
+        wavelength_nm: None,
     };
+    let place = Place { config, lists: vec![own], light_curves: Vec::new(), schema: args.output.schema() };
     let known = args.known.over(import.known.clone())?;
     let spinner = progress::bar(global, None, "a first look, and a map to try it out");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));

@@ -4,7 +4,7 @@ use super::output::ConfigFile;
 use super::{Failure, Global, console, progress};
 use crate::data::config::ConfigError;
 use crate::data::dataset::SceneError;
-use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
+use crate::data::init::{Given, Known, LightCurve, List, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
 use crate::data::io::{FileError, atomic, lsd};
 use crate::numerics::text::shown;
@@ -16,16 +16,28 @@ use std::path::{Path, PathBuf};
 ///
 /// Takes from the profiles what they say: velocity range, vsini, systemic velocity, noise, and priors of the orbit. The
 /// rest is given by options or assumed; a list says which is which. The rotation period cannot be assumed: without it
-/// the config holds a null in its place, and no other command takes it. Then tries out whether a map can be made of it
-/// all.
+/// the config holds a null in its place, and no other command takes it. Then tries it out on some of the profiles, and
+/// writes nothing where `map` would find no maps.
+///
+/// Several lists are several data sets of one star, each of its own spectrograph: they go into one config, the velocity
+/// offsets of all but the first fitted.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
-    demo.json"
+    after_help = "Examples:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
+    demo.json\n  dimcmc init espadons/observations.txt harps/observations.txt --photometry tess.csv \\\n    \
+    --rotation-period 2.741 --inclination 55 --resolving-power 65000,115000"
 )]
 pub struct Args {
-    /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line
-    observations: PathBuf,
+    /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line. Several are
+    /// data sets of one star
+    #[arg(required = true)]
+    observations: Vec<PathBuf>,
+    /// Light curve of the same weeks: a table of time, flux and its error; repeat the option for several
+    #[arg(long, value_name = "FILE")]
+    photometry: Vec<PathBuf>,
+    /// Wavelength (nm) of each light curve, separated by commas: about 790 for TESS, 640 for Kepler
+    #[arg(long, value_name = "NM", value_delimiter = ',')]
+    photometry_wavelength: Vec<f64>,
     #[command(flatten)]
     output: ConfigFile,
     #[command(flatten)]
@@ -60,22 +72,23 @@ pub struct KnownArgs {
     /// Temperature of the spots (K)
     #[arg(long, value_name = "K")]
     spot: Option<f64>,
-    /// Wavelength of the profiles (nm)
-    #[arg(long, value_name = "NM")]
-    wavelength: Option<f64>,
+    /// Wavelength of the profiles (nm); of several lists one of each, separated by commas
+    #[arg(long, value_name = "NM", value_delimiter = ',')]
+    wavelength: Vec<f64>,
     /// Standard deviation of the local line (km/s), without the spectrograph
     #[arg(long, value_name = "KMS")]
     line_sigma: Option<f64>,
-    /// Resolving power of the spectrograph
-    #[arg(long, value_name = "R")]
-    resolving_power: Option<f64>,
+    /// Resolving power of the spectrograph; of several lists one of each, separated by commas
+    #[arg(long, value_name = "R", value_delimiter = ',')]
+    resolving_power: Vec<f64>,
     /// Velocities (km/s, after VRAD) to be used: what lies outside is not looked at, bad bins at the ends say
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
     velocity_range: Option<Vec<f64>>,
     /// What a reconstruction is judged by: all maps of a star that may change, or the map with the fewest spots
     #[arg(long, value_name = "NAME", value_parser = ["marginal-likelihood", "spottedness"])]
     objective: Option<String>,
-    /// What the map may hold: brightnesses above and below that of the photosphere, or spots alone
+    /// What a static map may hold (--objective spottedness): brightnesses above and below that of the photosphere, or
+    /// spots alone
     #[arg(long, value_name = "MODEL", value_parser = ["bright-and-dark", "spots"])]
     brightness: Option<String>,
     /// Pixels of the image
@@ -98,9 +111,9 @@ impl KnownArgs {
             ("--limb-darkening", self.limb_darkening, "star.limb_darkening", |known| &mut known.limb_darkening),
             ("--photosphere", self.photosphere, "star.photosphere_k", |known| &mut known.photosphere_k),
             ("--spot", self.spot, "star.spot_k", |known| &mut known.spot_k),
-            ("--wavelength", self.wavelength, "star.wavelength_nm", |known| &mut known.wavelength_nm),
+            ("--wavelength", self.wavelength.first().copied(), "star.wavelength_nm", |known| &mut known.wavelength_nm),
             ("--line-sigma", self.line_sigma, "star.line.sigma_kms", |known| &mut known.line_sigma_kms),
-            ("--resolving-power", self.resolving_power, "instrument.resolving_power", |known| {
+            ("--resolving-power", self.resolving_power.first().copied(), "instrument.resolving_power", |known| {
                 &mut known.resolving_power
             }),
         ]
@@ -133,10 +146,38 @@ impl KnownArgs {
             let value = [BrightnessModel::Spots, BrightnessModel::BrightAndDark].into_iter().find(model);
             known.brightness = value.map(|value| Given { value, by: "--brightness".to_owned() });
         }
+        let has_field = known.objective.as_ref().is_none_or(|given| given.value.properties().has_field);
+        if has_field && self.brightness.is_some() {
+            return Err(Failure::input(
+                "--brightness: leave it out: evolving maps, the default, may be brighter or darker than the photosphere. \
+                 It is for a static map, --objective spottedness",
+            ));
+        }
         if let Some(value) = self.pixels {
             known.pixels = Some(Given { value, by: "--pixels".to_owned() });
         }
         Ok(known)
+    }
+
+    /// Values of an option for `lists` lists: none, one for all, or one of each; what each after the first has of its
+    /// own.
+    fn of_lists(name: &str, values: &[f64], lists: usize) -> Result<Vec<Option<Given<f64>>>, Failure> {
+        if values.len() > 1 && values.len() != lists {
+            let problem =
+                format!("{name}: {} values, and {lists} of what they are for: give one, or one each", values.len());
+            return Err(Failure::input(problem));
+        }
+        if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+            return Err(Failure::input(format!("{name}: must be a finite number, not {value}")));
+        }
+        let given = |value: &f64| Given { value: *value, by: name.to_owned() };
+        Ok((0..lists).map(|s| values.get(s).map(given)).collect())
+    }
+
+    /// That options of which several lists have one each are single numbers.
+    pub fn check_single(&self) -> Result<(), Failure> {
+        KnownArgs::of_lists("--resolving-power", &self.resolving_power, 1)?;
+        KnownArgs::of_lists("--wavelength", &self.wavelength, 1).map(drop)
     }
 
     /// Why there is no proposal; by its option where a value is at fault that was given by one, and by the `list` where
@@ -160,26 +201,107 @@ impl KnownArgs {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check(None)?;
-    let list = &args.observations;
-    args.output.spare(&lsd::files(list), None)?;
-    let bytes = std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))?;
+    let lists = &args.observations;
+    for list in lists {
+        args.output.spare(&lsd::files(list), None)?;
+    }
+    args.output.spare(&args.photometry, None)?;
+    let read = |list: &PathBuf| {
+        std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))
+    };
+    let bytes = lists.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let known = args.known.over(Known::default())?;
     let place = Place {
         config: args.output.path(),
-        list,
-        list_bytes: &bytes,
-        list_in_config: args.output.relative(list)?,
+        lists: args.lists(&bytes)?,
+        light_curves: args.light_curves(&known)?,
         schema: args.output.schema(),
     };
-    let known = args.known.over(Known::default())?;
     let spinner = progress::bar(global, None, "a first look, and a map to try it out");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
-    let proposal = proposal.map_err(|error| args.known.failure(error, list))?;
+    let proposal = proposal.map_err(|error| args.known.failure(error, &lists[0]))?;
     args.output.check(None)?;
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));
     next_commands(&proposal, args.output.path());
     Ok(())
+}
+
+impl Args {
+    /// The lists of the contents `bytes`.
+    fn lists<'a>(&'a self, bytes: &'a [Vec<u8>]) -> Result<Vec<List<'a>>, Failure> {
+        let lists = &self.observations;
+        let several = lists.len() > 1;
+        let evolves = self.known.objective.as_deref().is_none_or(|name| name == ObjectiveKind::default().name());
+        if several && !evolves {
+            let problem = "several lists take the objective \"marginal-likelihood\", which fits the velocity offsets \
+                           between them: leave --objective out, or give one list";
+            return Err(Failure::input(problem));
+        }
+        let powers = KnownArgs::of_lists("--resolving-power", &self.known.resolving_power, lists.len())?;
+        let wavelengths = KnownArgs::of_lists("--wavelength", &self.known.wavelength, lists.len())?;
+        let names = names(lists);
+        let mut found = Vec::new();
+        for (s, (list, list_bytes)) in lists.iter().zip(bytes).enumerate() {
+            if let Some(same) = lists[..s].iter().find(|other| same_file(other, list)) {
+                return Err(Failure::input(format!("{}: is given twice", shown(same))));
+            }
+            found.push(List {
+                list,
+                list_bytes,
+                list_in_config: self.output.relative(list)?,
+                name: names.as_ref().map(|names| names[s].clone()).filter(|_| several),
+                resolving_power: powers[s].clone(),
+                wavelength_nm: wavelengths[s].clone(),
+            });
+        }
+        Ok(found)
+    }
+
+    /// The light curves.
+    fn light_curves(&self, known: &Known) -> Result<Vec<LightCurve>, Failure> {
+        let takes = known.objective.as_ref().is_none_or(|given| given.value.properties().takes_light_curves);
+        if !takes && !self.photometry.is_empty() {
+            let problem = "--photometry: takes the objective \"marginal-likelihood\": leave --objective out";
+            return Err(Failure::input(problem));
+        }
+        let count = self.photometry.len();
+        let wavelengths = KnownArgs::of_lists("--photometry-wavelength", &self.photometry_wavelength, count)?;
+        let mut found = Vec::new();
+        for (k, (path, given)) in self.photometry.iter().zip(wavelengths).enumerate() {
+            let name = plain(&path.file_stem().unwrap_or_default().to_string_lossy());
+            let unique = name.filter(|name| found.iter().all(|other: &LightCurve| other.name != *name));
+            found.push(LightCurve {
+                name: unique.unwrap_or_else(|| format!("photometry{}", k + 1)),
+                path_in_config: self.output.relative(path)?,
+                wavelength_nm: given.map(|given| given.value),
+            });
+        }
+        Ok(found)
+    }
+}
+
+/// Whether two paths are of one file.
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Names of data sets: of their lists, or of the folders of these, whichever are different; `None` where neither are.
+fn names(lists: &[PathBuf]) -> Option<Vec<String>> {
+    let name = |part: fn(&Path) -> Option<&std::ffi::OsStr>| -> Option<Vec<String>> {
+        let of = |list: &PathBuf| plain(&part(list)?.to_string_lossy());
+        let names = lists.iter().map(of).collect::<Option<Vec<String>>>()?;
+        let different = names.iter().map(|name| name.to_lowercase()).collect::<std::collections::BTreeSet<_>>();
+        (different.len() == lists.len()).then_some(names)
+    };
+    name(|list| list.parent()?.file_name()).or_else(|| name(Path::file_stem))
+}
+
+/// The characters of `text` that a name may have; `None` where none are left.
+fn plain(text: &str) -> Option<String> {
+    let name: String = text.chars().filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c)).take(40).collect();
+    Some(name).filter(|name| !name.is_empty())
 }
 
 /// What to do with the config at `path`.

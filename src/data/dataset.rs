@@ -51,21 +51,23 @@ impl Dataset {
         Dataset::of(settings, sets, light_curves)
     }
 
-    /// The same with profiles at hand in place of those of the only data set.
+    /// The same with profiles at hand in place of those of each data set.
     ///
     /// # Errors
-    /// As [`Dataset::read`], several data sets, and one that is simulated.
-    pub fn with_profiles(settings: &Settings, profiles: ProfileSet) -> Result<Self, SceneError> {
+    /// As [`Dataset::read`], another number of data sets, and ones that are simulated.
+    pub fn with_profiles(settings: &Settings, profiles: Vec<ProfileSet>) -> Result<Self, SceneError> {
         let light_curves = light_curves(settings)?;
         let fault = |problem: &str| settings.fault("observations", problem);
-        profiles.observations.check().map_err(|problem| fault(&problem))?;
-        let [set] = &settings.sets[..] else {
-            return Err(fault("profiles at hand are one data set: give one").into());
-        };
-        if let ObservationSource::Simulate(_) = &set.source {
+        profiles.iter().try_for_each(|set| set.observations.check()).map_err(|problem| fault(&problem))?;
+        match profiles.len() {
+            sets if sets == settings.sets.len() => {}
+            1 => return Err(fault("profiles at hand are one data set: give one").into()),
+            _ => return Err(fault("profiles at hand are as many data sets as the config has").into()),
+        }
+        if settings.sets.iter().any(|set| matches!(set.source, ObservationSource::Simulate(_))) {
             return Err(fault("profiles are given and simulated: leave out `simulate`").into());
         }
-        Dataset::of(settings, vec![profiles], light_curves)
+        Dataset::of(settings, profiles, light_curves)
     }
 
     fn of(settings: &Settings, all: Vec<ProfileSet>, mut light_curves: Vec<Measurements>) -> Result<Self, SceneError> {

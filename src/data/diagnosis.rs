@@ -4,13 +4,17 @@
 //! and faculae, each on coarse maps at the errors with which the config's own map fits. Of what helps most the best
 //! value is looked for, and the smallest chi2 that a map then comes down to. Where nothing helps the errors are left:
 //! they are too small, or the profiles hold something that the model of the star does not know. Two things wrong at
-//! once show as the one that helps more.
+//! once show as the one that helps more. Profiles with the lines of two stars, and variances given for standard
+//! deviations, are recognised without maps.
 
 mod change;
 
+use crate::data::calibrated::of_sets;
 use crate::data::scene::Scene;
+use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
-use crate::surface::calibration::noise::{FITTED, chi2_at, factor_to_fit};
+use crate::surface::calibration::first_look::DoubleLines;
+use crate::surface::calibration::noise::{FITTED, by_neighbours, chi2_at, factor_to_fit, variances};
 use change::{Change, Patient};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -47,6 +51,10 @@ pub enum Reason {
     RotationPeriod,
     /// What the map holds: bright pixels beside dark ones.
     Brightness,
+    /// Lines of two stars.
+    DoubleLines,
+    /// Variances in place of standard deviations.
+    Variances,
     /// Nothing that was tried.
     Errors,
 }
@@ -59,10 +67,12 @@ pub struct Diagnosis {
     /// It in words, with what helps.
     pub text: String,
     /// chi2 per independent datum that a map comes down to as it is, with errors as the continuum has them, or as
-    /// given.
-    pub chi2_per_datum: f64,
+    /// given; absent where no map was made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chi2_per_datum: Option<f64>,
     /// The same with the change that helps most.
-    pub chi2_per_datum_changed: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chi2_per_datum_changed: Option<f64>,
     /// Everything that was tried, with chi2 relative to that without a change.
     pub tried: Vec<Tried>,
 }
@@ -77,9 +87,12 @@ pub struct Tried {
 }
 
 impl Diagnosis {
-    /// Of a scene that no map fits as well as its errors promise, by trying. `None` where there is no map at all, and
-    /// of several data sets.
+    /// Of a scene that no map fits as well as its errors promise: at sight, or by trying. `None` where there is no map
+    /// at all. Of several data sets nothing is tried.
     pub fn of(scene: &Scene) -> Option<Self> {
+        if let Some(seen) = Self::at_sight(scene) {
+            return Some(seen);
+        }
         if scene.settings.sets.len() > 1 {
             return None;
         }
@@ -126,9 +139,23 @@ impl Diagnosis {
         Some(Diagnosis {
             reason,
             text,
-            chi2_per_datum: chi2(unchanged),
-            chi2_per_datum_changed: chi2(changed),
+            chi2_per_datum: Some(chi2(unchanged)),
+            chi2_per_datum_changed: Some(chi2(changed)),
             tried: tried.collect(),
+        })
+    }
+
+    /// What takes no map to see, in any of the data sets.
+    pub fn at_sight(scene: &Scene) -> Option<Self> {
+        let parts = of_sets(&scene.imager, &scene.whole_over_continuum());
+        let several = parts.len() > 1;
+        parts.iter().zip(&scene.settings.sets).find_map(|(part, set)| {
+            let double =
+                DoubleLines::of(part, set.star.line.sigma_kms).map(|lines| (Reason::DoubleLines, lines.text()));
+            let variances = || Some((Reason::Variances, by_neighbours(part).and_then(|(q, f)| variances(q, f))?));
+            let (reason, text) = double.or_else(variances)?;
+            let text = if several { format!("{}: {text}", set.name) } else { text };
+            Some(Diagnosis { reason, text, chi2_per_datum: None, chi2_per_datum_changed: None, tried: Vec::new() })
         })
     }
 }
@@ -137,6 +164,10 @@ impl Diagnosis {
 fn patient(scene: &Scene) -> Patient {
     let mut settings = scene.settings.clone();
     settings.imaging.pixels = settings.imaging.pixels.min(PIXELS);
+    // a field of spots is brighter or darker than the photosphere
+    if settings.imaging.objective.properties().has_field {
+        settings.imaging.brightness = Some(BrightnessModel::BrightAndDark);
+    }
     let (mut scale, mut correlated_bins) = (1.0, 1.0);
     if let Some(errors) = scene.measured.errors.as_ref() {
         correlated_bins = errors.correlated_bins;

@@ -87,7 +87,7 @@ impl Scene {
         };
         let settings = config.settings()?;
         let profiles = in_memory(profiles, |k| format!("profile {k}"));
-        let data = Arc::new(Dataset::with_profiles(&settings, profiles)?);
+        let data = Arc::new(Dataset::with_profiles(&settings, vec![profiles])?);
         Scene::of(settings, data)
     }
 

@@ -224,7 +224,7 @@ fn every_command_takes_it_and_the_injected_orbit_is_found() {
 #[test]
 fn maps_of_an_evolving_star_have_filling_factors() {
     let mut config = crate::shared::config();
-    config["imaging"]["brightness"] = json!("bright-and-dark");
+    config["observations"]["simulate"]["faculae"] = json!(FACULAE);
     let desk = Desk::new(config);
     desk.succeed(&["map", "config.json", "--out", "map"]);
     let maps = desk.json("map/map.json")["maps"].as_array().unwrap().clone();

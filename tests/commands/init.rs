@@ -54,12 +54,12 @@ fn the_config_is_taken_as_it_is() {
             "--rotation-period",
             "assumed, please check\n",
             "--resolving-power",
-            "note: tried out: a brightness that varies by ",
+            "note: tried out: evolving maps fit the 11 profiles with chi2 = ",
             "written: star.json\n",
             "  dimcmc map star.json --out map ",
         ],
     );
-    assert!(!table.contains("still to be given"));
+    assert!(!table.contains("still to be given") && !table.contains("imaging.brightness"));
     let config = desk.json("star.json");
     assert!((number(&config, "/star/vsini_kms") - 25.0).abs() < 1.0, "its error says 0.7, the width of the line open");
     assert!((number(&config, "/star/vsys_kms") - 1.7).abs() < 0.3, "three errors of 0.1");
@@ -158,10 +158,7 @@ fn wrong_errors_are_scaled() {
             });
         }
         let table = desk.succeed(&INIT);
-        says(
-            &table,
-            &["observations.sigma_scale", "auto", "rescaled by", "note: tried out: a brightness that varies by "],
-        );
+        says(&table, &["observations.sigma_scale", "auto", "rescaled by", "note: tried out: evolving maps fit "]);
         assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
         desk.succeed(&["map", "star.json", "--out", "map"]);
         let found = number(&desk.json("map/fit.json"), "/measured/errors/sigma_scale");
@@ -172,9 +169,18 @@ fn wrong_errors_are_scaled() {
 
 /// Intensities of profile `k` become `change(k, intensity)`, times and errors stay.
 fn with_intensities(desk: &Desk, change: impl Fn(usize, f64) -> f64) {
+    with_rows(desk, |k, _, intensity, sigma| (change(k, intensity), sigma));
+}
+
+/// Intensity and its error of profile `k` become `change(k, velocity, intensity, error)`, times stay.
+fn with_rows(desk: &Desk, change: impl Fn(usize, f64, f64, f64) -> (f64, f64)) {
     for k in 0..PROFILES {
+        let number = |text: &str| text.parse::<f64>().unwrap();
         let changed = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
-            [v, i, s] => format!("{v} {} {s}\n", change(k, i.parse::<f64>().unwrap())),
+            [v, i, s] => {
+                let (i, s) = change(k, number(v), number(i), number(s));
+                format!("{v} {i:e} {s:e}\n")
+            }
             _ => format!("{line}\n"),
         };
         desk.edit(&format!("data/p{k:03}.prof"), |text| {
@@ -282,32 +288,207 @@ fn a_vsini_of_another_star_is_put_right() {
         &table,
         &[
             "note: vsini is given as 45 km/s, the mean profile looks like 2",
-            "note: no map fits with the given vsini, and one does much better with that of the mean profile, which is \
-            written: 2",
+            "note: maps fit much better with the vsini of the mean profile than with the given one: 2",
             "next:\n  dimcmc map star.json",
         ],
     );
     assert!((number(&desk.json("star.json"), "/star/vsini_kms") - 25.0).abs() < 1.2);
 }
 
-/// A line that is too broad for the profiles: the config is written all the same, with what is likely to be wrong.
+/// A line that is too broad for the profiles: `init` refuses what `map` would, with the same reason, and writes nothing.
 #[test]
-fn a_model_that_does_not_fit_is_no_dead_end() {
+fn what_map_would_refuse_is_refused_with_the_reason() {
     let desk = desk();
-    let table = desk.succeed(&[&INIT[..], &["--line-sigma", "9", "--vsini", "25"]].concat());
+    let wrong = ["--line-sigma", "9", "--vsini", "25"];
+    let message = desk.refusal(&[&INIT[..], &wrong].concat());
+    says(
+        &message,
+        &[
+            "data/observations.txt: `map` would find no maps of these profiles (amplitude-at-bound): ",
+            "the width of the local line is the likely reason: with star.line.sigma_kms = ",
+        ],
+    );
+    assert!(!desk.path("star.json").exists());
+    // as `map` does, of a config by hand
+    desk.succeed(&INIT);
+    let mut config = desk.json("star.json");
+    config["star"]["line"]["sigma_kms"] = json!(9.0);
+    config["star"]["vsini_kms"] = json!(25.0);
+    desk.write("star.json", &config.to_string());
+    let message = failure(&desk, &["map", "star.json", "--out", "map"]);
+    says(&message, &["no map (amplitude-at-bound)", "the width of the local line is the likely reason"]);
+}
+
+/// What a command says that fails though its input makes sense.
+fn failure(desk: &Desk, args: &[&str]) -> String {
+    let failed = dimcmc(args, &desk.path(""));
+    assert_eq!(failed.status.code(), Some(1), "{args:?}: {}", text(&failed.stdout));
+    text(&failed.stderr)
+}
+
+/// Profiles that end where the line does: their continuum is seen at their ends alone.
+#[test]
+fn a_continuum_at_the_ends_alone_is_recognised() {
+    let mut config = simulated();
+    config["observations"]["simulate"]["velocity_kms"] = json!({ "min": -32.3, "max": 35.7, "step": 1.7 });
+    let desk = Desk::new(config);
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    with_intensities(&desk, |_, intensity| 0.977 * intensity);
+    let table = desk.succeed(&INIT);
     says(
         &table,
-        &["note: the model does not fit as well as the errors promise: the width of the local line is the likely \
-            reason"],
+        &[
+            "observations.continuum_level",
+            "note: tried out: evolving maps fit",
+            "as quoted: too little continuum beside the line to measure them by. Give profiles that reach farther, or",
+        ],
     );
-    assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
-    let failed = dimcmc(&["map", "star.json", "--out", "map"], &desk.path(""));
-    assert_eq!(failed.status.code(), Some(1));
-    says(&text(&failed.stderr), &["no map (amplitude-at-bound)", "the width of the local line is the likely reason"]);
-    desk.succeed(
-        &[&INIT[..], &["--line-sigma", "9", "--vsini", "25", "--force", "--objective", "spottedness"]].concat(),
-    );
+    assert!(!table.contains("unknown"), "{table}");
+    let config = desk.json("star.json");
+    let level = number(&config, "/observations/continuum_level");
+    assert!((level - 0.977).abs() < 2e-3, "{level}: ten errors of a bin of the mean profile");
+    assert!((number(&config, "/star/vsini_kms") - 25.0).abs() < 1.2);
     desk.succeed(&["map", "star.json", "--out", "map"]);
+    // what ends within the line is none: its ends are no continuum
+    let mut config = simulated();
+    config["observations"]["simulate"]["velocity_kms"] = json!({ "min": -22.1, "max": 25.5, "step": 1.7 });
+    let cut = Desk::new(config);
+    cut.succeed(&["simulate", "config.json", "--out", "data"]);
+    cut.succeed(&[&INIT[..], &["--line-sigma", "2.5"]].concat());
+    assert!(cut.json("star.json")["observations"].get("continuum_level").is_none());
+}
+
+/// Continua that are tilted, all alike: their slope is written, and `map` takes it up.
+#[test]
+fn continua_that_are_tilted_are_let() {
+    let desk = desk();
+    with_rows(&desk, |_, v, i, s| (i * (1.0 + 2e-4 * v), s));
+    let table = desk.succeed(&INIT);
+    says(&table, &["imaging.nuisances.continuum_slope", "more than their noise explains", "tried out: evolving maps"]);
+    let config = desk.json("star.json");
+    let range = &config["observations"]["velocity_range_kms"];
+    let expected = 1e-4 * (range[1].as_f64().unwrap() - range[0].as_f64().unwrap());
+    let slope = number(&config, "/imaging/nuisances/continuum_slope");
+    assert!((slope / expected - 1.0).abs() < 0.2, "{slope} {expected}");
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+}
+
+/// Variances in place of standard deviations are named, not put right.
+#[test]
+fn variances_are_named() {
+    const SAID: &str = "the uncertainties of the profiles look like variances: they are 1.1e-5";
+    let desk = desk();
+    with_rows(&desk, |_, _, i, s| (i, s * s));
+    says(&desk.succeed(&INIT), &[SAID, "Give standard deviations, the roots of these numbers"]);
+    assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
+    // where there is no continuum beside the line to scale them by, no map could be made
+    let mut config = simulated();
+    config["observations"]["simulate"]["velocity_kms"] = json!({ "min": -34.0, "max": 37.4, "step": 1.7 });
+    let desk = Desk::new(config);
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    with_rows(&desk, |_, _, i, s| (i, s * s));
+    says(&desk.refusal(&INIT), &["data/observations.txt: ", SAID]);
+}
+
+/// A second star in the profiles is named by `init` and `map`, and no other rotation period is advised.
+#[test]
+fn double_lines_are_named() {
+    const SAID: &str = "the profiles look like those of a double-lined binary";
+    let desk = desk();
+    desk.succeed(&INIT);
+    with_rows(&desk, |k, v, i, s| {
+        let away = (v - 30.0 * (1.3 * k as f64).sin()) / 9.0;
+        (i - 0.06 * (1.0 - away * away).max(0.0).sqrt(), s)
+    });
+    let message = desk.refusal(&[&INIT[..], &["--out", "other.json"]].concat());
+    says(&message, &["`map` would find no maps of these profiles", SAID, "Take out the line of the companion"]);
+    assert!(!message.contains("rotation_period") && !desk.path("other.json").exists(), "{message}");
+    let message = failure(&desk, &["map", "star.json", "--out", "map"]);
+    says(&message, &["no map (", SAID]);
+    assert!(!message.contains("rotation_period"), "{message}");
+}
+
+/// Evolving maps are as bright and as dark as the profiles say: nothing is to be chosen.
+#[test]
+fn brightness_is_for_static_maps() {
+    let desk = desk();
+    let refused = desk.refusal(&[&INIT[..], &["--brightness", "spots"]].concat());
+    says(&refused, &["--brightness: leave it out", "--objective spottedness"]);
+    desk.succeed(&INIT);
+    let mut config = desk.json("star.json");
+    assert!(config["imaging"].get("brightness").is_none());
+    for model in ["spots", "bright-and-dark"] {
+        config["imaging"]["brightness"] = json!(model);
+        desk.write("star.json", &config.to_string());
+        let refused = desk.refusal(&["map", "star.json", "--out", "map"]);
+        says(&refused, &["star.json: imaging.brightness: leave it out", "\"spottedness\""]);
+    }
+}
+
+/// Two spectrographs and a light curve become one config, which every command takes.
+#[test]
+fn several_lists_and_a_light_curve_are_joined() {
+    let mut config = simulated();
+    let mut second = json!({ "simulate": {
+        "cycles": [0.07, 0.31, 0.64, 0.93, 1.27, 1.49, 1.75, 1.98],
+        "velocity_kms": { "min": -60.0, "max": 60.0, "step": 2.0 }, "snr": 250, "seed": 8, "pixels": 2000,
+        "zero_point_kms": 0.4
+    } });
+    second["name"] = json!("harps");
+    second["resolving_power"] = json!(115000);
+    second["wavelength_nm"] = json!(520);
+    let mut first = config["observations"].clone();
+    first["name"] = json!("espadons");
+    config["observations"] = json!([first, second]);
+    config["photometry"] =
+        json!({ "name": "tess", "wavelength_nm": 790, "simulate": { "cadence_d": 0.1, "sigma": 1e-3 } });
+    config["imaging"] = json!({ "objective": "marginal-likelihood" });
+    let desk = Desk::new(config);
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    let both = ["init", "data/espadons/observations.txt", "data/harps/observations.txt"];
+    let star = ["--rotation-period", "3", "--inclination", "50", "--pixels", "300"];
+    let own = ["--photometry", "data/tess.csv", "--resolving-power", "65000,115000", "--wavelength", "550,520"];
+    let table = desk.succeed(&[&both[..], &star, &own].concat());
+    println!("{table}");
+    says(
+        &table,
+        &[
+            "11 profiles of 49 bins",
+            "8 profiles of 61 bins",
+            "observations[1].zero_point_kms",
+            "observations[1].resolving_power",
+            "observations[1].wavelength_nm",
+            "photometry.wavelength_nm",
+            "note: tried out: evolving maps fit the 19 profiles",
+        ],
+    );
+    let config = desk.json("star.json");
+    let sets = config["observations"].as_array().unwrap();
+    assert_eq!(sets.iter().map(|set| &set["name"]).collect::<Vec<_>>(), ["espadons", "harps"]);
+    assert!(sets[0].get("zero_point_kms").is_none() && sets[1]["zero_point_kms"] == "fitted");
+    assert_eq!((number(&config, "/instrument/resolving_power"), number(&sets[1], "/resolving_power")), (65e3, 115e3));
+    assert_eq!((number(&config, "/star/wavelength_nm"), number(&sets[1], "/wavelength_nm")), (550.0, 520.0));
+    assert!(sets.iter().all(|set| set["velocity_range_kms"].is_array() && set["sigma_scale"] == "auto"));
+    assert_eq!(config["photometry"]["path"], "data/tess.csv");
+    assert_eq!(number(&config, "/photometry/wavelength_nm"), 790.0);
+    assert!((number(&config, "/star/vsini_kms") - 25.0).abs() < 1.0);
+    // orbits of all times, and K of no offset between the sets
+    assert_eq!(config["parameters"]["porb_over_prot"]["max"], 2.0);
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+    desk.succeed(&["periodogram", "star.json", "--out", "search"]);
+    let offset = &desk.json("map/fit.json")["measured"]["sets"][1]["zero_point"];
+    let (value, sigma) = (number(offset, "/value_kms"), number(offset, "/sigma_kms"));
+    assert!((value - 0.4).abs() < 3.0 * sigma && sigma < 0.3, "{offset}");
+
+    let refused = |more: &[&str], parts: &[&str]| {
+        says(&desk.refusal(&[&both[..], &["--out", "no.json"], more].concat()), parts);
+    };
+    refused(&["--objective", "spottedness"], &["several lists", "\"marginal-likelihood\""]);
+    refused(&["--resolving-power", "1e5,1e5,1e5"], &["--resolving-power: 3 values, and 2 "]);
+    refused(&["data/../data/harps/observations.txt"], &["is given twice"]);
+    refused(&["--photometry", "absent.csv"], &["absent.csv: cannot read"]);
+    let one = ["init", both[1], "--photometry", "data/tess.csv", "--objective", "spottedness", "--out", "no.json"];
+    says(&desk.refusal(&one), &["--photometry: takes the objective \"marginal-likelihood\""]);
 }
 
 #[test]

@@ -3,7 +3,8 @@
 
 use super::document::compact;
 use super::written::{
-    ImagingSettings, Instrument, ObservationsSection, PerParameter, Planet, PriorSection, Star, VelocityJitter,
+    ImagingSettings, Instrument, Listed, ObservationsSection, PerParameter, PhotometrySection, Planet, PriorSection,
+    Star, VelocityJitter,
 };
 use crate::model::{Parameter, PriorKind};
 use serde::Serialize;
@@ -19,8 +20,11 @@ pub struct Draft {
     /// The spectrograph.
     pub instrument: Instrument,
     planet: Planet,
-    /// The profiles.
-    pub observations: ObservationsSection,
+    /// The profiles: one data set or several.
+    pub observations: Listed<ObservationsSection>,
+    /// The light curves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub photometry: Option<Listed<PhotometrySection>>,
     /// The image.
     pub imaging: ImagingSettings,
     parameters: PerParameter<PriorSection>,
@@ -43,7 +47,7 @@ impl Draft {
     pub fn new(
         star: Star<Option<f64>>,
         instrument: Instrument,
-        observations: ObservationsSection,
+        (observations, photometry): (Vec<ObservationsSection>, Vec<PhotometrySection>),
         imaging: ImagingSettings,
         sought: Sought,
         porb_over_prot: f64,
@@ -55,8 +59,10 @@ impl Draft {
             (Parameter::Phi, periodic),
             (Parameter::Vsys, PriorSection::even(PriorKind::Uniform, sought.vsys_kms)),
         ]);
-        let draft =
-            Draft { schema: None, star, instrument, planet: Planet::default(), observations, imaging, parameters };
+        let observations = Listed::of(observations);
+        let photometry = (!photometry.is_empty()).then(|| Listed::of(photometry));
+        let planet = Planet::default();
+        let draft = Draft { schema: None, star, instrument, planet, observations, photometry, imaging, parameters };
         draft.with_orbit((0.0, porb_over_prot, 0.0))
     }
 
@@ -76,7 +82,7 @@ impl Draft {
 
     /// The same with this scatter of the velocity zero points.
     pub fn with_jitter(mut self, jitter: VelocityJitter) -> Self {
-        self.observations.velocity_jitter_kms = Some(jitter);
+        self.observations.sections.iter_mut().for_each(|set| set.velocity_jitter_kms = Some(jitter));
         self
     }
 
@@ -86,8 +92,10 @@ impl Draft {
     /// If the path of the observations is not Unicode, as JSON must be.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         let mut draft = self.clone();
-        let jitter = &mut draft.observations.velocity_jitter_kms;
-        *jitter = jitter.and_then(|jitter| jitter.mentioned(self.imaging.objective));
+        for set in &mut draft.observations.sections {
+            set.velocity_jitter_kms =
+                set.velocity_jitter_kms.and_then(|jitter| jitter.mentioned(self.imaging.objective));
+        }
         Ok(compact(&serde_json::to_string_pretty(&draft)?))
     }
 }

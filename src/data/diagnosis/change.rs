@@ -18,7 +18,7 @@ const LINE_WIDTH: [f64; 5] = [0.35, 0.5, 0.7, 1.4, 2.0];
 const WINGS: [(f64, f64); 3] = [(0.3, 0.85), (0.6, 0.7), (1.0, 0.5)];
 const PERIOD: [f64; 6] = [0.5, 0.9, 0.95, 1.05, 1.1, 2.0];
 
-/// Standard deviation of the offset that continua of single profiles may have.
+/// Standard deviation of the offset, or of the slope, that continua of single profiles may have.
 const OFFSET: f64 = 0.03;
 
 /// The line ends that many standard deviations of the local line beyond vsini.
@@ -53,6 +53,8 @@ pub(super) enum Change {
     Level(f64),
     /// A level of the continuum for each profile.
     Offsets,
+    /// A slope of the continuum for each profile.
+    Slopes,
     /// A map of brightnesses, bright ones too.
     BrightAndDark,
     /// Velocities (km/s) used, from and to.
@@ -75,7 +77,7 @@ impl Change {
         if settings.sets[0].star.line.gamma_kms == 0.0 && settings.values.get(Parameter::LineSigma).is_none() {
             all.extend(WINGS.map(|(gamma, sigma)| Change::Wings(gamma, sigma)));
         }
-        if settings.imaging.brightness == BrightnessModel::Spots {
+        if settings.imaging.brightness() == BrightnessModel::Spots {
             all.push(Change::BrightAndDark);
         }
         all.extend(PERIOD.map(Change::Period));
@@ -85,7 +87,7 @@ impl Change {
         }
         all.extend(level(patient).map(Change::Level));
         if settings.sets[0].nuisances.is_none() {
-            all.push(Change::Offsets);
+            all.extend([Change::Offsets, Change::Slopes]);
         }
         all.extend(range(patient).map(|(from, to)| Change::Range(from, to)));
         all
@@ -100,7 +102,7 @@ impl Change {
             Change::BrightAndDark => Reason::Brightness,
             Change::Period(_) => Reason::RotationPeriod,
             Change::MeasuredStrength => Reason::EquivalentWidth,
-            Change::Level(_) | Change::Offsets => Reason::Continuum,
+            Change::Level(_) | Change::Offsets | Change::Slopes => Reason::Continuum,
             Change::Range(..) => Reason::VelocityRange,
         }
     }
@@ -116,7 +118,8 @@ impl Change {
             Reason::EquivalentWidth => "the equivalent width of the line",
             Reason::Continuum => "the continuum",
             Reason::VelocityRange => "the velocity range",
-            Reason::Errors => "the errors",
+            Reason::DoubleLines => "the line of a second star",
+            Reason::Variances | Reason::Errors => "the errors",
         }
     }
 
@@ -158,6 +161,7 @@ impl Change {
                 format!("observations.continuum_level = {level:.4} (times the present one, if there is one)")
             }
             Change::Offsets => format!("imaging.nuisances.continuum_offset = {OFFSET}"),
+            Change::Slopes => format!("imaging.nuisances.continuum_slope = {OFFSET}"),
             Change::Range(from, to) => format!("observations.velocity_range_kms = [{from:.1}, {to:.1}]"),
         }
     }
@@ -180,7 +184,7 @@ impl Change {
                 line.gamma_kms = gamma * total;
                 line.sigma_kms = before_spectrograph(sigma * total, instrument).hypot(instrument);
             }
-            Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
+            Change::BrightAndDark => settings.imaging.brightness = Some(BrightnessModel::BrightAndDark),
             // the orbit, if there is one, keeps its period in days
             Change::Period(factor) => settings.values.star.omega_eq_rad_d /= factor,
             Change::MeasuredStrength => settings.sets[0].star.line.equivalent_width_kms = None,
@@ -188,6 +192,10 @@ impl Change {
             Change::Offsets => {
                 let offsets = LineAndContinuum { continuum_offset: OFFSET, ..Default::default() };
                 settings.sets[0].nuisances = Some(offsets);
+            }
+            Change::Slopes => {
+                let slopes = LineAndContinuum { continuum_slope: OFFSET, ..Default::default() };
+                settings.sets[0].nuisances = Some(slopes);
             }
             Change::Range(from, to) => changed.observations = within(patient, *from, *to)?,
         }

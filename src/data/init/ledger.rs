@@ -32,7 +32,7 @@ impl Source {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The key with its parents, dotted.
-    pub key: &'static str,
+    pub key: String,
     /// The value as text.
     pub value: String,
     /// Its unit; empty for none.
@@ -46,8 +46,9 @@ pub struct Entry {
 impl Entry {
     /// Where its section stands in a config.
     pub(super) fn section(&self) -> usize {
-        const SECTIONS: [&str; 6] = ["star", "instrument", "planet", "observations", "imaging", "parameters"];
-        let section = self.key.split('.').next();
+        const SECTIONS: [&str; 7] =
+            ["star", "instrument", "planet", "observations", "photometry", "imaging", "parameters"];
+        let section = self.key.split(['.', '[']).next();
         SECTIONS.iter().position(|name| section == Some(name)).unwrap_or(SECTIONS.len())
     }
 }
@@ -61,13 +62,13 @@ pub(super) struct Ledger {
 impl Ledger {
     pub fn note(
         &mut self,
-        key: &'static str,
+        key: impl Into<String>,
         value: impl ToString,
         unit: &'static str,
         source: Source,
         remark: impl Into<String>,
     ) {
-        self.entries.push(Entry { key, value: value.to_string(), unit, source, remark: remark.into() });
+        self.entries.push(Entry { key: key.into(), value: value.to_string(), unit, source, remark: remark.into() });
     }
 
     /// The given value, or another one with its source and remark; noted either way.
@@ -85,6 +86,24 @@ impl Ledger {
         value
     }
 
+    /// Takes over what `other` says of the data set `s`, of several.
+    pub fn take_set(&mut self, other: &Ledger, s: usize) {
+        let own = |entry: &Entry| {
+            let key = of_set(&entry.key, s)?;
+            Some(Entry { key, ..entry.clone() })
+        };
+        self.entries.extend(other.entries.iter().filter_map(own));
+    }
+
+    /// The same of the first data set, and all that it says of the star.
+    pub fn take_first(&mut self, other: Ledger) {
+        let own = |entry: Entry| Entry {
+            key: of_set(&entry.key, 0).filter(|_| entry.key != INSTRUMENT).unwrap_or(entry.key),
+            ..entry
+        };
+        self.entries.extend(other.entries.into_iter().map(own));
+    }
+
     /// Another value, from the data, for a key that is there.
     pub fn replace(&mut self, key: &str, value: impl ToString, remark: &str) {
         for entry in self.entries.iter_mut().filter(|entry| entry.key == key) {
@@ -93,6 +112,19 @@ impl Ledger {
             entry.remark = remark.to_owned();
         }
     }
+}
+
+/// The key of the resolving power, which is that of the first data set.
+const INSTRUMENT: &str = "instrument.resolving_power";
+
+/// A key of the config as that of data set `s` of several; `None` of what all have in common.
+fn of_set(key: &str, s: usize) -> Option<String> {
+    let own = match key {
+        INSTRUMENT => "resolving_power",
+        _ => key.strip_prefix("observations.").or_else(|| key.strip_prefix("imaging."))?,
+    };
+    let is_own = key.starts_with("observations.") || own.starts_with("nuisances.") || own == "resolving_power";
+    (is_own && own != "velocity_jitter_kms").then(|| format!("observations[{s}].{own}"))
 }
 
 /// Whether a value was given, or where it came from otherwise.

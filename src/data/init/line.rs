@@ -14,14 +14,9 @@ const CONTINUUM: (f64, f64) = (6.0, 2.0);
 const POORLY: f64 = 0.25;
 
 /// Where the continuum is, where it is not at 1.
-pub(super) fn note_continuum(look: &FirstLook, level: Option<f64>, ledger: &mut Ledger) {
-    if let (Some(level), Some(continuum)) = (level, look.continuum) {
-        let remark = format!(
-            "the continuum beside the line is there, +- {:.0e}: profiles are divided by it",
-            continuum.level_error
-        );
-        ledger.note("observations.continuum_level", level, "", Source::Data, remark);
-    }
+pub(super) fn note_continuum(level: f64, error: f64, ledger: &mut Ledger) {
+    let remark = format!("the continuum beside the line is there, +- {error:.0e}: profiles are divided by it");
+    ledger.note("observations.continuum_level", level, "", Source::Data, remark);
 }
 
 /// Width of the local line: given, or as the flanks of the mean profile have it.

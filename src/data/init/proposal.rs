@@ -1,6 +1,8 @@
 //! A first config with where its values came from, and the table of them.
 
+use super::known::Given;
 use super::ledger::{Entry, Source};
+use super::light::LightCurve;
 use crate::data::config::Draft;
 use crate::data::dataset::SceneError;
 use crate::numerics::text::{Align, columns};
@@ -12,14 +14,36 @@ use std::path::{Path, PathBuf};
 pub struct Place<'a> {
     /// The config that will be written.
     pub config: &'a Path,
-    /// The list of profiles.
+    /// The lists of profiles, one at least.
+    pub lists: Vec<List<'a>>,
+    /// Light curves beside them.
+    pub light_curves: Vec<LightCurve>,
+    /// The JSON Schema as the config names it.
+    pub schema: Option<String>,
+}
+
+/// A list of profiles.
+#[derive(Clone, Debug)]
+pub struct List<'a> {
+    /// The list.
     pub list: &'a Path,
     /// Its content, which need not have been written.
     pub list_bytes: &'a [u8],
     /// The list as the config names it, relative to the config's folder.
     pub list_in_config: PathBuf,
-    /// The JSON Schema as the config names it.
-    pub schema: Option<String>,
+    /// Its name, where it is one of several.
+    pub name: Option<String>,
+    /// Resolving power of its spectrograph, where it has one of its own.
+    pub resolving_power: Option<Given<f64>>,
+    /// Wavelength (nm) of its profiles, where it has one of its own.
+    pub wavelength_nm: Option<Given<f64>>,
+}
+
+impl Place<'_> {
+    /// The list that is named where something is wrong with all.
+    pub(super) fn first_list(&self) -> &Path {
+        self.lists[0].list
+    }
 }
 
 /// A config and where its values came from.
@@ -61,6 +85,24 @@ pub enum ProposalError {
         /// The likely reason, by trying.
         reason: String,
     },
+    /// Uncertainties that are variances, and no continuum to scale them by.
+    #[error("{}: {text}", .list.display())]
+    Variances {
+        /// The list of profiles.
+        list: PathBuf,
+        /// What they are.
+        text: String,
+    },
+    /// No map can be made of the profiles with these values.
+    #[error("{}: `map` would find no maps of these profiles{status}: {reason}", .list.display())]
+    NoMaps {
+        /// The list of profiles.
+        list: PathBuf,
+        /// How the reconstruction ended, in parentheses.
+        status: String,
+        /// The likely reason.
+        reason: String,
+    },
     /// A path that JSON cannot hold.
     #[error("{}: the path of the observations cannot be written in JSON: {problem}", .config.display())]
     Path {
@@ -78,7 +120,7 @@ impl Proposal {
         let mut ordered: Vec<&Entry> = Source::ALL.into_iter().flat_map(shown).collect();
         ordered.sort_by_key(|entry| (entry.source as usize, entry.section()));
         let cells =
-            |entry: &&Entry| vec![entry.key.into(), entry.value.clone(), entry.unit.into(), entry.remark.clone()];
+            |entry: &&Entry| vec![entry.key.clone(), entry.value.clone(), entry.unit.into(), entry.remark.clone()];
         let rows: Vec<Vec<String>> = ordered.iter().map(cells).collect();
         let table = columns(&rows, &[Align::Left, Align::Right, Align::Left, Align::Left]);
         let mut text = format!("{}\n", self.observed);

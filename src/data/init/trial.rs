@@ -1,5 +1,6 @@
-//! Tries a draft out: whether a map reaches its target chi2 with errors as the continuum has them, without a planet or
-//! with the best orbit that a search finds, and what is likely to be wrong if none does.
+//! Tries a draft out as `map` would: by the maps of its objective, on few pixels and few profiles for the sake of time;
+//! and what is likely to be wrong if there are none. Of a static map it is whether it reaches its target chi2 with
+//! uncertainties as the continuum has them, without a planet or with the best orbit that a search finds.
 
 use super::digits::rounded;
 use super::known::Known;
@@ -11,16 +12,21 @@ use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::scene::Scene;
 use crate::inference::search::SearchError;
 use crate::model::Parameter;
-use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::surface::calibration::noise::MeasuredErrors;
-use crate::surface::expansion::nuisances;
-use crate::surface::{Change, NoMaps, ObjectiveKind, ReferenceError};
+use crate::surface::{NoMaps, ReferenceError, SurfaceMaps};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
 const STAND_IN_D: f64 = 1.0;
+
+/// Pixels, and so many profiles of each data set at least, with which evolving maps are tried.
+const PIXELS: usize = 500;
+const PROFILES: usize = 12;
+
+/// A vsini is a better one where ln Z is higher by more than this.
+const BETTER: f64 = 10.0;
 
 /// Errors that a map needs may be larger by this than those that it is hoped to do with.
 const AS_GOOD: f64 = 0.8;
@@ -41,12 +47,12 @@ pub(super) struct Trial {
     pub errors: Option<MeasuredErrors>,
     /// Why no map fits as well as the errors promise, if none does.
     pub diagnosis: Option<Diagnosis>,
-    /// That the star changes, where no map fits and that is why.
-    pub change: Option<Change>,
     /// Whether the start is an orbit, since there is no fit without one.
     pub orbit: bool,
     /// Whether the measured vsini stands in place of the given one, with which nothing fits.
     pub measured_vsini: bool,
+    /// What has to be known of the maps.
+    pub warnings: Vec<String>,
 }
 
 /// How it ended.
@@ -54,15 +60,8 @@ pub(super) struct Trial {
 pub(super) enum End {
     /// It was not tried: there is no rotation period.
     Untried,
-    /// A map reaches the target.
-    Reached {
-        /// How spotted the star is then.
-        spottedness: f64,
-    },
-    /// None does, since the star changes.
-    Changes,
-    /// None does, and none will: why.
-    Failed(String),
+    /// There are maps: what they are, in words.
+    Fits(String),
 }
 
 /// The key of the velocity zero points.
@@ -80,27 +79,123 @@ struct Attempt {
     misfit: f64,
 }
 
-/// Tries `draft` on its profiles. Changes the draft's start where only an orbit makes a map fit, and vsini where the
-/// given one is far from that of the profiles and no map fits with it. No orbit is searched for with such a vsini.
+/// Tries `draft` on its profiles, a set for each list. Changes vsini where the given one is far from that of the
+/// profiles and no map fits with it; of a static map the draft's start, too, where only an orbit makes a map fit. No
+/// orbit is searched for with such a vsini.
 ///
 /// # Errors
-/// Given values that make no sense; a model so far from the profiles that nothing helps.
+/// Given values that make no sense; a model that has no maps of these profiles, with the likely reason.
 pub(super) fn run(
     draft: &mut Draft,
-    Place { config, list, .. }: &Place,
-    profiles: &ProfileSet,
+    place: &Place,
+    profiles: &[ProfileSet],
     values: &Values,
     known: &Known,
 ) -> Result<Trial, ProposalError> {
-    let mut trial =
-        Trial { end: End::Untried, errors: None, diagnosis: None, change: None, orbit: false, measured_vsini: false };
     if draft.star.rotation_period_d.is_none() {
         let mut stand_in = draft.clone().with_jitter(VelocityJitter::default());
         stand_in.star.rotation_period_d = Some(STAND_IN_D);
-        stand_in.observations.sigma_scale = Some(Automatic::Number(1.0));
-        scene(&stand_in, config, profiles)?;
-        return Ok(trial);
+        stand_in.observations.sections.iter_mut().for_each(|set| set.sigma_scale = Some(Automatic::Number(1.0)));
+        let share: Vec<ProfileSet> = profiles.iter().map(|set| share(set, PROFILES)).collect();
+        scene(&stand_in, place.config, &share)?;
+        return Ok(Trial::of(End::Untried));
     }
+    match known.objective().properties().map_changes {
+        true => evolving(draft, place, profiles, values, known),
+        false => unchanging(draft, place, profiles, values, known),
+    }
+}
+
+/// The trial of maps that evolve.
+fn evolving(
+    draft: &mut Draft,
+    place: &Place,
+    profiles: &[ProfileSet],
+    values: &Values,
+    known: &Known,
+) -> Result<Trial, ProposalError> {
+    let few: Vec<ProfileSet> = profiles.iter().map(|set| share(set, PROFILES)).collect();
+    // what is wrong with the draft itself is said of itself
+    config::from_json(to_json(draft, place.config)?.as_bytes(), place.config).map_err(SceneError::from)?;
+    let tried = |draft: &Draft| -> Result<(Scene, Result<SurfaceMaps, NoMaps>), ProposalError> {
+        let mut coarse = draft.clone();
+        coarse.imaging.pixels = coarse.imaging.pixels.min(PIXELS);
+        let scene = scene(&coarse, place.config, &few)?;
+        let first_d = scene.observations.profiles.first().map(|profile| profile.time_d);
+        let maps = scene.maps(Some(first_d.as_slice()));
+        Ok((scene, maps))
+    };
+    let (mut scene, mut maps) = tried(draft)?;
+    let mut trial = Trial::of(End::Untried);
+    if values.is_another_star(known) {
+        let mut measured = draft.clone();
+        measured.star.vsini_kms = rounded(values.look.unspotted.vsini_kms, 1);
+        let (other, of_other) = tried(&measured)?;
+        let height = |maps: &Result<SurfaceMaps, NoMaps>| {
+            let field = maps.as_ref().ok().and_then(|maps| maps.field.as_ref());
+            field.map_or(f64::NEG_INFINITY, |field| field.ln_evidence)
+        };
+        if height(&of_other) > height(&maps) + BETTER {
+            (*draft, scene, maps, trial.measured_vsini) = (measured, other, of_other, true);
+        }
+    }
+    let maps = match maps {
+        Ok(maps) => maps,
+        Err(error) => return Err(no_maps(place, Diagnosis::of(&scene), &error)),
+    };
+    let field = maps.field.as_ref();
+    let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();
+    if field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
+        trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| diagnosis.reason != Reason::Errors);
+    }
+    trial.warnings = maps.checks.warnings.clone();
+    let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());
+    let of = if used < all { format!("{used} of the {all}") } else { format!("the {all}") };
+    let spots = field.map_or_else(String::new, |field| {
+        let lifetime = field.spot_lifetime_d.map_or_else(String::new, |days| format!(", lifetime some {days:.0} d"));
+        format!(" (amplitude of the spots {:.2}{lifetime})", field.spot_amplitude)
+    });
+    let chi2 = maps.summary.chi2_per_datum;
+    trial.end = End::Fits(format!("evolving maps fit {of} profiles with chi2 = {chi2:.2} per datum{spots}"));
+    // errors are those of all profiles; what several data sets say of them takes a fit
+    if let [one] = profiles {
+        trial.errors = self::scene(draft, place.config, std::slice::from_ref(one))?.measured.errors;
+    }
+    Ok(trial)
+}
+
+/// The number of profiles.
+fn count(set: &ProfileSet) -> usize {
+    set.observations.profiles.len()
+}
+
+/// Every n-th profile of a set, so that `least` are left, and less than twice as many.
+fn share(set: &ProfileSet, least: usize) -> ProfileSet {
+    let every = (count(set) / least).max(1);
+    let mut few = set.clone();
+    few.sha256 = None;
+    few.labels = set.labels.iter().step_by(every).cloned().collect();
+    few.observations.profiles = set.observations.profiles.iter().step_by(every).cloned().collect();
+    few
+}
+
+/// That there are no maps, and why, as `map` would say it.
+fn no_maps(place: &Place, diagnosis: Option<Diagnosis>, error: &NoMaps) -> ProposalError {
+    let status = error.status().map_or_else(String::new, |status| format!(" ({status})"));
+    let reason = diagnosis.map_or_else(|| error.to_string(), |diagnosis| diagnosis.text);
+    ProposalError::NoMaps { list: place.first_list().into(), status, reason }
+}
+
+/// The trial of static maps.
+fn unchanging(
+    draft: &mut Draft,
+    place: &Place,
+    profiles: &[ProfileSet],
+    values: &Values,
+    known: &Known,
+) -> Result<Trial, ProposalError> {
+    let config = place.config;
+    let mut trial = Trial::of(End::Untried);
     let mut attempt = match attempt_of(draft, config, profiles) {
         // few profiles do not tell how much their zero points scatter
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, .. }))) if key == JITTER => {
@@ -118,17 +213,9 @@ pub(super) fn run(
         }
     }
     let is_this_star = trial.measured_vsini || !values.is_another_star(known);
-    if attempt.misfits && is_this_star && known.objective().properties().map_changes {
-        trial.change = change(draft, config, profiles)?;
-        if trial.change.is_some() {
-            // a line that is wrong may look like a star that changes
-            let wrong = attempt.scene.as_ref().and_then(Diagnosis::of);
-            trial.diagnosis = wrong.filter(|diagnosis| diagnosis.reason != Reason::Errors);
-            trial.end = End::Changes;
-            return Ok(trial);
-        }
-    }
-    if attempt.misfits && is_this_star {
+    // neither a second star nor variances are a planet's
+    let seen = attempt.scene.as_ref().filter(|_| attempt.misfits).and_then(Diagnosis::at_sight);
+    if attempt.misfits && is_this_star && seen.is_none() {
         let mut with_orbit = draft.clone();
         if search(&mut with_orbit, config, profiles, attempt.scene.as_ref())? {
             let other = attempt_of(&with_orbit, config, profiles)?;
@@ -138,8 +225,9 @@ pub(super) fn run(
         }
     }
     if attempt.misfits {
-        trial.diagnosis = attempt.scene.as_ref().and_then(Diagnosis::of);
+        trial.diagnosis = seen.or_else(|| attempt.scene.as_ref().and_then(Diagnosis::of));
     }
+    let list = place.first_list();
     let hopeless = |diagnosis: &&Diagnosis| diagnosis.reason == Reason::Errors && attempt.misfit > MOST_MISFIT;
     if let Some(diagnosis) = trial.diagnosis.as_ref().filter(hopeless) {
         let (factor, reason) = (attempt.misfit, diagnosis.text.clone());
@@ -147,57 +235,31 @@ pub(super) fn run(
     }
     trial.errors = attempt.scene.and_then(|scene| scene.measured.errors);
     trial.end = match attempt.reached {
-        Ok(spottedness) => End::Reached { spottedness },
-        Err(error) => End::Failed(error),
+        Ok(spottedness) => End::Fits(spotted(spottedness, draft, trial.orbit)),
+        Err(error) => {
+            let reason = trial.diagnosis.map_or(error, |diagnosis| diagnosis.text);
+            return Err(ProposalError::NoMaps { list: list.into(), status: String::new(), reason });
+        }
     };
     Ok(trial)
 }
 
-/// What the profiles say of their errors where all maps are integrated over.
-///
-/// # Errors
-/// As [`run`].
-pub(super) fn errors(
-    draft: &Draft,
-    config: &Path,
-    profiles: &ProfileSet,
-) -> Result<Option<MeasuredErrors>, ProposalError> {
-    Ok(integrated(draft, config, profiles)?.measured.errors)
-}
-
-fn integrated(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Scene, ProposalError> {
-    let mut draft = draft.clone();
-    draft.imaging.objective = ObjectiveKind::MarginalLikelihood;
-    scene(&draft, config, profiles)
-}
-
-/// That the star changes, if it does.
-fn change(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Option<Change>, ProposalError> {
-    let Scene { settings, imager, .. } = integrated(draft, config, profiles)?;
-    let Ok(frequencies) =
-        Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())
-    else {
-        return Ok(None);
-    };
-    let change = Change::of(&imager, settings.values, &frequencies, &nuisances(&settings.free), settings.known_field());
-    Ok(change.ok().filter(Change::is_changing))
-}
-
 /// The draft as commands see it.
-fn scene(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Scene, ProposalError> {
+fn scene(draft: &Draft, config: &Path, profiles: &[ProfileSet]) -> Result<Scene, ProposalError> {
     let settings = config::from_json(to_json(draft, config)?.as_bytes(), config).map_err(SceneError::from)?;
-    let data = Dataset::with_profiles(&settings, profiles.clone())?;
+    let data = Dataset::with_profiles(&settings, profiles.to_vec())?;
     Ok(Scene::of(settings, Arc::new(data))?)
 }
 
-/// The map at the draft's values.
-fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Attempt, ProposalError> {
+/// The static map at the draft's values.
+fn attempt_of(draft: &Draft, config: &Path, profiles: &[ProfileSet]) -> Result<Attempt, ProposalError> {
+    let fitted = Some(VelocityJitter::FITTED);
+    let jitter = draft.observations.sections.iter().any(|set| set.velocity_jitter_kms == fitted);
     let scene = match scene(draft, config, profiles) {
         Ok(scene) => scene,
         // what is measured, not what is given
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })))
-            if key == "observations.sigma_scale"
-                || key == JITTER && draft.observations.velocity_jitter_kms != Some(VelocityJitter::FITTED) =>
+            if key == "observations.sigma_scale" || key == JITTER && !jitter =>
         {
             let reached = Err(format!("{key}: {problem}"));
             return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
@@ -226,14 +288,15 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Att
 fn search(
     draft: &mut Draft,
     config: &Path,
-    profiles: &ProfileSet,
+    profiles: &[ProfileSet],
     tried: Option<&Scene>,
 ) -> Result<bool, ProposalError> {
     let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
     let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
     let mut with_its_errors = draft.clone();
     if let Some(scale) = by_continuum {
-        with_its_errors.observations.sigma_scale = Some(Automatic::Number(scale));
+        let sections = &mut with_its_errors.observations.sections;
+        sections.iter_mut().for_each(|set| set.sigma_scale = Some(Automatic::Number(scale)));
     }
     let scene = scene(&with_its_errors, config, profiles)?;
     let found = match scene.optimise() {
@@ -254,53 +317,49 @@ fn search(
     Ok(true)
 }
 
+/// A static map in words.
+fn spotted(spottedness: f64, draft: &Draft, orbit: bool) -> String {
+    let orbit = if orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
+    let (percent, spots) = (100.0 * spottedness, draft.imaging.brightness() == BrightnessModel::Spots);
+    let many = match spots && spottedness > MANY_SPOTS {
+        true => "; that is a lot: are vsini, inclination and line right?",
+        false => "",
+    };
+    let what = match spots {
+        true => format!("spots on {percent:.1} % of the star fit"),
+        false => format!("a brightness that varies by {percent:.1} % rms fits"),
+    };
+    format!("{what} the profiles{orbit}{many}")
+}
+
 impl Trial {
+    fn of(end: End) -> Self {
+        Trial { end, errors: None, diagnosis: None, orbit: false, measured_vsini: false, warnings: Vec::new() }
+    }
+
     /// Whether a map can be made of the config as it is.
     pub fn is_complete(&self) -> bool {
-        matches!(self.end, End::Reached { .. } | End::Changes)
+        matches!(self.end, End::Fits(_))
     }
 
     /// It in words.
     pub fn notes(&self, draft: &Draft) -> Vec<String> {
         let vsini = self.measured_vsini.then(|| {
             format!(
-                "no map fits with the given vsini, and one does much better with that of the mean profile, which is \
-                written: {} km/s",
+                "maps fit much better with the vsini of the mean profile than with the given one: {} km/s is written",
                 draft.star.vsini_kms
             )
         });
-        let misfit = self.diagnosis.as_ref().map(|diagnosis| {
-            let larger = self.errors.as_ref().and_then(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
-                format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
-            });
-            format!("the model does not fit as well as the errors promise: {}{larger}", diagnosis.text)
-        });
-        vsini.into_iter().chain(misfit).chain([self.ending(draft)]).collect()
-    }
-
-    fn ending(&self, draft: &Draft) -> String {
-        match &self.end {
-            End::Untried => "without a rotation period no command takes the config".into(),
-            End::Reached { spottedness } => {
-                let orbit =
-                    if self.orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
-                let (percent, spots) = (100.0 * spottedness, draft.imaging.brightness == BrightnessModel::Spots);
-                let many = match spots && *spottedness > MANY_SPOTS {
-                    true => "; that is a lot: are vsini, inclination and line right?",
-                    false => "",
-                };
-                let what = match spots {
-                    true => format!("spots on {percent:.1} % of the star fit"),
-                    false => format!("a brightness that varies by {percent:.1} % rms fits"),
-                };
-                format!("tried out: {what} the profiles{orbit}{many}")
+        let ending = match (&self.end, &self.diagnosis) {
+            (End::Untried, _) => "without a rotation period no command takes the config".into(),
+            (End::Fits(maps), None) => format!("tried out: {maps}"),
+            (End::Fits(maps), Some(diagnosis)) => {
+                let larger = self.errors.as_ref().and_then(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
+                    format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
+                });
+                format!("tried out: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
             }
-            End::Changes => {
-                "tried out: no map of a star that stays as it is fits the profiles, and none need: the star \
-                             changes while it is observed"
-                    .into()
-            }
-            End::Failed(error) => format!("no command takes the config as it is: {error}"),
-        }
+        };
+        vsini.into_iter().chain([ending]).chain(self.warnings.iter().cloned()).collect()
     }
 }

@@ -6,16 +6,16 @@ use super::ledger::{Ledger, Source, origin};
 use super::line;
 use crate::data::config::{
     Automatic, Draft, EquivalentWidth, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape,
-    ObservationsSection, Sought, Star, VelocityJitter,
+    ObservationsSection, PhotometrySection, Sought, Star, VelocityJitter,
 };
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
-use crate::surface::calibration::first_look::{Continuum, FirstLook, LineModel, LookError};
+use crate::surface::calibration::first_look::{FirstLook, LineModel, LookError, Noise};
+use crate::surface::calibration::noise;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::nuisances::LineAndContinuum;
-use crate::surface::{Change, ObjectiveKind};
 
 /// What is assumed where nobody says otherwise.
 mod assumed {
@@ -59,7 +59,6 @@ pub(super) struct Values {
     pub velocity_range_kms: (f64, f64),
     /// Level of the continuum that the profiles were divided by, if they were.
     pub continuum_level: Option<f64>,
-    profiles: usize,
     line_sigma_kms: f64,
     resolving_power: f64,
     limb_darkening: f64,
@@ -96,29 +95,48 @@ impl Values {
             return Err(LookError::Unresolved { sigma_kms, instrumental_kms });
         }
         let mut continuum_level = None;
-        if let Some(continuum) = look.continuum.filter(Continuum::is_off) {
-            let level = rounded(continuum.level, 4);
+        if let Some((measured, error)) = look.level {
+            let level = rounded(measured, 4);
             *whole = whole.clone().over_continuum(level);
             look = FirstLook::at(whole, model)?;
             continuum_level = Some(level);
+            line::note_continuum(level, error, ledger);
         }
-        line::note_continuum(&look, continuum_level, ledger);
         let line_sigma_kms = line::sigma_kms(&look, model, known, ledger);
         let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms(), known, ledger);
-        let profiles = whole.profiles.len();
-        Ok(Values {
-            look,
-            velocity_range_kms,
-            continuum_level,
-            profiles,
-            line_sigma_kms,
-            resolving_power,
-            limb_darkening,
-        })
+        Ok(Values { look, velocity_range_kms, continuum_level, line_sigma_kms, resolving_power, limb_darkening })
     }
 
-    /// The config's values, from the profiles within the velocity range.
-    pub fn draft(&self, cut: &Observations, known: &Known, ledger: &mut Ledger) -> Draft {
+    /// What other data sets say of the star as well: vsini and local line become the means of all, weighted by their
+    /// errors, and the time base is that of all.
+    pub fn join(&mut self, others: &[&Values], known: &Known, ledger: &mut Ledger) {
+        if others.is_empty() {
+            return;
+        }
+        let looks = || others.iter().map(|other| &other.look).chain([&self.look]);
+        let vsini = looks().map(|look| (look.unspotted.vsini_kms, look.vsini_error_kms));
+        let (vsini_kms, vsini_error_kms) = weighted_mean(vsini);
+        let line = looks().filter_map(|look| Some((look.unspotted.line_sigma_kms, look.line_sigma_error_kms?)));
+        let (sigma_kms, sigma_error_kms) = weighted_mean(line);
+        let first = looks().map(|look| look.span_d.0).fold(f64::INFINITY, f64::min);
+        let last = looks().map(|look| look.span_d.1).fold(f64::NEG_INFINITY, f64::max);
+        self.look.span_d = (first, last);
+        (self.look.unspotted.vsini_kms, self.look.vsini_error_kms) = (vsini_kms, vsini_error_kms);
+        if known.line_sigma_kms.is_none() && sigma_error_kms > 0.0 {
+            self.line_sigma_kms = rounded(sigma_kms, 1);
+            let remark = format!("+- {sigma_error_kms:.1}, local line, mean of all data sets; --line-sigma");
+            ledger.replace("star.line.sigma_kms", self.line_sigma_kms, &remark);
+        }
+    }
+
+    /// The config's values, from the profiles of each data set within the velocity range.
+    pub fn draft(
+        &self,
+        cuts: &[&Observations],
+        light: Vec<PhotometrySection>,
+        known: &Known,
+        ledger: &mut Ledger,
+    ) -> Draft {
         let look = &self.look;
         let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
         let rotation_period_d = self.rotation_period(known, ledger);
@@ -130,7 +148,7 @@ impl Values {
         let by_centre = format!("+- {:.2}, centre of the mean profile", look.centre_error_kms);
         let vsys = (rounded(look.unspotted.centre_kms, 2), Source::Data, by_centre.as_str());
         let vsys_kms = ledger.settle(("star.vsys_kms", "km/s"), &known.vsys_kms, vsys);
-        let (porb_over_prot, porb_over_prot_range) = self.periods(cut, rotation_period_d, ledger);
+        let (porb_over_prot, porb_over_prot_range) = self.periods(cuts, rotation_period_d, ledger);
         let epoch_d = ledger.settle(("star.epoch_d", "d"), &known.epoch_d, epoch);
         let inclination_deg = ledger.settle(("star.inclination_deg", "deg"), &known.inclination_deg, inclination);
         let vsini_kms = ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini);
@@ -165,25 +183,30 @@ impl Values {
                 shape: gamma_kms.map_or(LineShape::Gaussian, |_| LineShape::Voigt),
                 sigma_kms: self.line_sigma_kms,
                 gamma_kms,
-                equivalent_width_kms: equivalent_width(cut, known, ledger),
+                equivalent_width_kms: equivalent_width(cuts, known, ledger),
             },
         };
-        let sigma_scale = known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value));
-        let observations = ObservationsSection {
-            velocity_range_kms: Some(self.velocity_range_kms.into()),
-            sigma_scale: Some(sigma_scale),
-            continuum_level: self.continuum_level,
-            velocity_jitter_kms: Some(VelocityJitter::FITTED),
-            ..ObservationsSection::default()
-        };
-        let imaging = ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) };
+        let imaging = imaging(known, ledger);
         let sought = Sought {
-            k_kms: (0.0, k_max(cut, ledger)),
+            k_kms: (0.0, k_max(cuts, ledger)),
             porb_over_prot: porb_over_prot_range,
             vsys_kms: self.vsys_range(vsys_kms, ledger),
         };
         let instrument = Instrument { resolving_power: Some(self.resolving_power) };
-        Draft::new(star, instrument, observations, imaging, sought, porb_over_prot)
+        Draft::new(star, instrument, (Vec::new(), light), imaging, sought, porb_over_prot)
+    }
+
+    /// The profiles as a data set; with the nuisances of its own where it is one of several.
+    pub fn section(&self, known: &Known, ledger: &mut Ledger, several: bool) -> ObservationsSection {
+        let sigma_scale = known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value));
+        ObservationsSection {
+            velocity_range_kms: Some(self.velocity_range_kms.into()),
+            sigma_scale: Some(sigma_scale),
+            continuum_level: self.continuum_level,
+            velocity_jitter_kms: Some(VelocityJitter::FITTED),
+            nuisances: if several { self.nuisances(ledger) } else { None },
+            ..ObservationsSection::default()
+        }
     }
 
     fn rotation_period(&self, known: &Known, ledger: &mut Ledger) -> Option<f64> {
@@ -196,10 +219,11 @@ impl Values {
     }
 
     /// Start and prior of `Porb/Prot`: the periods that `periodogram` searches, up to one orbit in the whole time base.
-    fn periods(&self, cut: &Observations, rotation: Option<f64>, ledger: &mut Ledger) -> (f64, (f64, f64)) {
+    fn periods(&self, cuts: &[&Observations], rotation: Option<f64>, ledger: &mut Ledger) -> (f64, (f64, f64)) {
         const KEY: &str = "parameters.porb_over_prot";
         let searched = rotation.filter(|period| *period > 0.0).and_then(|period| {
-            let cycles: Vec<f64> = cut.times_d().iter().map(|time| time / period).collect();
+            let times_d = cuts.iter().flat_map(|cut| cut.times_d());
+            let cycles: Vec<f64> = times_d.map(|time| time / period).collect();
             let frequencies = Frequencies::new(&cycles, period, FrequencySettings::default()).ok()?;
             let shortest = 1.0 / frequencies.per_cycle.last()?;
             Some((significant(shortest, f64::ceil), significant(frequencies.time_base_cycles, f64::floor)))
@@ -218,25 +242,40 @@ impl Values {
         (start.clamp(min, max), (min, max))
     }
 
-    /// Levels of single continua, where these wander by more than their noise.
-    fn nuisances(&self, ledger: &mut Ledger) -> Option<LineAndContinuum> {
-        let wandering = self.look.continuum.and_then(|continuum| continuum.wandering)?;
-        let continuum_offset = significant(wandering, f64::ceil);
-        let remark = format!("continua of single profiles scatter by {wandering:.1e}, more than their noise explains");
-        ledger.note("imaging.nuisances.continuum_offset", continuum_offset, "", Source::Data, remark);
-        Some(LineAndContinuum { continuum_offset, ..LineAndContinuum::default() })
+    /// Levels and slopes of single continua, where these wander or are tilted by more than their noise.
+    pub fn nuisances(&self, ledger: &mut Ledger) -> Option<LineAndContinuum> {
+        let continuum = self.look.continuum?;
+        let mut nuisances = LineAndContinuum::default();
+        if let Some(wandering) = continuum.wandering {
+            nuisances.continuum_offset = significant(wandering, f64::ceil);
+            let remark =
+                format!("continua of single profiles scatter by {wandering:.1e}, more than their noise explains");
+            let level = nuisances.continuum_offset;
+            ledger.note("imaging.nuisances.continuum_offset", level, "", Source::Data, remark);
+        }
+        if let Some(tilting) = continuum.tilting {
+            let (from, to) = self.velocity_range_kms;
+            nuisances.continuum_slope = significant(0.5 * (to - from) * tilting, f64::ceil);
+            let remark = "continua are tilted by that from the middle to the ends, more than their noise explains";
+            ledger.note("imaging.nuisances.continuum_slope", nuisances.continuum_slope, "", Source::Data, remark);
+        }
+        (nuisances != LineAndContinuum::default()).then_some(nuisances)
     }
 
     /// The factor on the errors with its reason; `measured` is what "auto" came to.
     pub fn note_errors(&self, known: &Known, measured: Option<&MeasuredErrors>, ledger: &mut Ledger) {
         let noise = &self.look.noise;
         let auto = match (measured, noise.scatter) {
+            (Some(measured), _) if measured.sigma_scale.is_none() => measured.line(),
             (Some(measured), _) => format!("measured by every command: {}", measured.line()),
             (None, Some(scatter)) => {
                 format!(
                     "measured by every command: quoted errors are {:.1e}, the continuum scatters by {scatter:.1e}",
                     noise.quoted
                 )
+            }
+            (None, None) if known.objective().properties().map_changes => {
+                format!("as quoted, {:.1e}: {}", noise.quoted, noise::NO_CONTINUUM)
             }
             (None, None) => {
                 format!("measured by every command: quoted errors are {:.1e}, by a map alone", noise.quoted)
@@ -250,7 +289,7 @@ impl Values {
     /// The scatter of zero points with its reason.
     pub fn note_jitter(draft: &Draft, ledger: &mut Ledger) {
         const KEY: &str = "observations.velocity_jitter_kms";
-        match draft.observations.velocity_jitter_kms.unwrap_or_default() {
+        match draft.observations.sections[0].velocity_jitter_kms.unwrap_or_default() {
             VelocityJitter::Word(_) => {
                 let remark = "measured by every command: zero points of single profiles, counted as noise";
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
@@ -303,7 +342,7 @@ impl Values {
     }
 
     /// Given values that the profiles do not agree with, and an assumed one that matters.
-    pub fn notes(&self, known: &Known) -> Vec<String> {
+    pub fn notes(&self, known: &Known, profiles: usize) -> Vec<String> {
         let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
         let disagrees = self.disagreement(known) > DISAGREEMENT;
         let vsini = known.vsini_kms.as_ref().filter(|_| disagrees).map(|given| {
@@ -320,19 +359,35 @@ impl Values {
                 shear.to_degrees()
             )
         });
-        let few = (self.profiles < FEWEST_FOR_AN_ORBIT).then(|| {
+        let few = (profiles < FEWEST_FOR_AN_ORBIT).then(|| {
             format!(
-                "{} profiles make a map, and show no orbit: `periodogram` and `sample` take {FEWEST_FOR_AN_ORBIT} or \
-                more",
-                self.profiles
+                "{profiles} profiles make a map, and show no orbit: `periodogram` and `sample` take \
+                {FEWEST_FOR_AN_ORBIT} or more"
             )
         });
         vsini.into_iter().chain(domega).chain(few).collect()
     }
 }
 
-fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> EquivalentWidth {
-    let auto = format!("{:.3} km/s in this range", cut.mean_equivalent_width_kms());
+/// What the profiles say of their errors if these look like variances.
+pub(super) fn variances(whole: &Observations, noise: &Noise) -> Option<String> {
+    let by_continuum = noise.ratio().map(|ratio| (noise.quoted, ratio));
+    let (quoted, factor) = by_continuum.or_else(|| noise::by_neighbours(whole))?;
+    noise::variances(quoted, factor)
+}
+
+/// Mean of values with their errors, and its error.
+fn weighted_mean(values: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let (sum, weights) = values.fold((0.0, 0.0), |(sum, weights), (x, error)| {
+        let weight = error.powi(-2);
+        (sum + weight * x, weights + weight)
+    });
+    (sum / weights, weights.sqrt().recip())
+}
+
+fn equivalent_width(cuts: &[&Observations], known: &Known, ledger: &mut Ledger) -> EquivalentWidth {
+    let widths: Vec<String> = cuts.iter().map(|cut| format!("{:.3}", cut.mean_equivalent_width_kms())).collect();
+    let auto = format!("{} km/s in this range", widths.join(" and "));
     let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::AUTO, |given| given.value);
     let (source, by) = origin(&known.equivalent_width, "");
     let (shown, unit, remark) = match value {
@@ -346,15 +401,17 @@ fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> E
 }
 
 fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
-    let brightness = known.brightness.as_ref().map_or(BrightnessModel::BrightAndDark, |given| given.value);
-    // a static map has the sharper eye for what is wrong with a model: it is tried out first
-    let objective = ObjectiveKind::Spottedness;
-    let mut imaging = ImagingSettings { brightness, objective, ..ImagingSettings::default() };
-    let (source, remark) = match &known.brightness {
-        Some(given) => (Source::Given, given.by.as_str()),
-        None => (Source::Assumed, "a star with faculae is no map of spots, and what does not fit looks like an orbit"),
-    };
-    ledger.note("imaging.brightness", brightness.name(), "", source, remark);
+    let mut imaging = ImagingSettings { objective: known.objective(), ..ImagingSettings::default() };
+    // a field of spots is brighter and darker than the photosphere
+    if !known.objective().properties().has_field {
+        let brightness = known.brightness.as_ref().map_or(BrightnessModel::BrightAndDark, |given| given.value);
+        let (source, remark) = match &known.brightness {
+            Some(given) => (Source::Given, given.by.as_str()),
+            None => (Source::Assumed, "a spots-only map cannot represent faculae; the misfit would mimic an orbit"),
+        };
+        ledger.note("imaging.brightness", brightness.name(), "", source, remark);
+        imaging.brightness = Some(brightness);
+    }
     if let Some(given) = &known.pixels {
         imaging.pixels = given.value;
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());
@@ -367,36 +424,32 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
 }
 
 /// What a reconstruction is judged by, and why.
-pub(super) fn note_objective(draft: &Draft, known: &Known, change: Option<&Change>, ledger: &mut Ledger) {
-    let (source, remark) = match (&known.objective, change) {
-        (Some(given), _) => (Source::Given, given.by.clone()),
-        (None, Some(change)) => (
-            Source::Data,
-            format!(
-                "the star changes: spots that live some {:.2} d explain the profiles better",
-                change.spot_lifetime_d
-            ),
-        ),
-        (None, None) => (
-            Source::Assumed,
-            "spots of most stars change within the observations, which looks like an orbit".to_owned(),
-        ),
+pub(super) fn note_objective(draft: &Draft, known: &Known, ledger: &mut Ledger) {
+    let (source, remark) = match &known.objective {
+        Some(given) => (Source::Given, given.by.as_str()),
+        None => (Source::Assumed, "spots of most stars evolve within the observations, which mimics an orbit"),
     };
     ledger.note("imaging.objective", draft.imaging.objective.name(), "", source, remark);
 }
 
 /// Upper bound of K: as far as the lines are seen to move from peak to peak, twice of what moves them if that is a
 /// planet.
-fn k_max(cut: &Observations, ledger: &mut Ledger) -> f64 {
+fn k_max(cuts: &[&Observations], ledger: &mut Ledger) -> f64 {
     const PHOTON_ERRORS: f64 = 5.0;
-    let moments = cut.first_moments();
-    let extreme = |f: fn(f64, f64) -> f64| moments.iter().map(|m| m.value_kms).reduce(f).unwrap_or(f64::NAN);
-    let photons = PHOTON_ERRORS * moments.iter().map(|m| m.sigma_kms).sum::<f64>() / moments.len() as f64;
+    // those of each data set about their own mean: an offset between data sets is no orbit
+    let moments: Vec<(f64, f64)> = cuts
+        .iter()
+        .flat_map(|cut| {
+            let moments = cut.first_moments();
+            let mean = moments.iter().map(|m| m.value_kms).sum::<f64>() / moments.len() as f64;
+            moments.into_iter().map(move |m| (m.value_kms - mean, m.sigma_kms))
+        })
+        .collect();
+    let count = moments.len() as f64;
+    let extreme = |f: fn(f64, f64) -> f64| moments.iter().map(|(value, _)| *value).reduce(f).unwrap_or(f64::NAN);
+    let photons = PHOTON_ERRORS * moments.iter().map(|(_, sigma)| sigma).sum::<f64>() / count;
     let max = significant((extreme(f64::max) - extreme(f64::min)).max(photons), f64::ceil);
-    let rms = {
-        let mean = moments.iter().map(|m| m.value_kms).sum::<f64>() / moments.len() as f64;
-        (moments.iter().map(|m| (m.value_kms - mean).powi(2)).sum::<f64>() / moments.len() as f64).sqrt()
-    };
+    let rms = (moments.iter().map(|(value, _)| value * value).sum::<f64>() / count).sqrt();
     let remark = format!("uniform; as far as first moments move from peak to peak (rms {rms:.3})");
     ledger.note("parameters.k_kms", format!("0 to {max}"), "km/s", Source::Data, remark);
     max

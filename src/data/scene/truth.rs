@@ -53,7 +53,7 @@ impl Scene {
     #[doc(hidden)]
     pub fn true_map_at(&self, time_d: f64) -> Option<Vec<f64>> {
         let (simulation, grid) = (self.simulation()?, &self.imager.grid);
-        Some(match self.settings.imaging.brightness {
+        Some(match self.settings.imaging.brightness() {
             BrightnessModel::Spots => simulation.spot_filling_at(grid, time_d),
             BrightnessModel::BrightAndDark => {
                 simulation.brightness_at(grid, simulation.contrast(&self.imager.star), time_d)

@@ -14,7 +14,7 @@
 
 use crate::model::{Parameter, ParameterValues};
 use crate::star::StarSettings;
-use crate::star::observation::Observations;
+use crate::star::observation::{Observations, Profile};
 use crate::surface::ReferenceError;
 use crate::surface::calibration::first_look::Scatter;
 use crate::surface::imaging::Imager;
@@ -103,6 +103,10 @@ impl NoiseError {
     }
 }
 
+/// What is missing where errors are not measured, and how to give it.
+pub const NO_CONTINUUM: &str = "too little continuum beside the line to measure them by. Give profiles that reach farther, or \
+     observations.sigma_scale as a number";
+
 /// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: errors are good to 13 and
 /// 22 %.
 const FEWEST: (usize, usize) = (30, 10);
@@ -124,6 +128,11 @@ const MISFIT: f64 = 1.3;
 
 /// The same where there is no continuum to hold them against, but only errors as quoted.
 const MISFIT_OF_QUOTED: f64 = 2.0;
+
+/// Uncertainties that are too small by more than this, and are the square of the scatter to these factors, look like
+/// variances.
+const TOO_SMALL: f64 = 8.0;
+const VARIANCES: std::ops::RangeInclusive<f64> = 0.5..=2.5;
 
 /// Beyond this many local line widths from the limb there is continuum.
 const BEYOND: f64 = 3.0;
@@ -231,14 +240,18 @@ impl MeasuredErrors {
 
     /// It in a line.
     pub fn line(&self) -> String {
-        let share = |x: Option<f64>| x.map_or_else(|| "unknown".to_owned(), |x| x.to_string());
-        let mut line = format!("continuum rms {}", share(self.continuum));
+        let mut line = match (self.continuum, self.residual) {
+            (Some(continuum), _) => format!("continuum rms {continuum}"),
+            (None, Some(_)) => "too little continuum beside the line".to_owned(),
+            (None, None) => return format!("as quoted: {NO_CONTINUUM}"),
+        };
         if let Some(scale) = self.sigma_scale {
+            let residual = self.residual.map_or_else(String::new, |of_map| format!(", map residuals {of_map}"));
             let together = match self.correlated_bins {
                 1.0 => String::new(),
                 bins => format!(", noise correlation length {bins} bins"),
             };
-            line = format!("rescaled by {scale} ({line}, map residuals {}{together})", share(self.residual));
+            line = format!("rescaled by {scale} ({line}{residual}{together})");
         }
         let extreme = |f: fn(f64, f64) -> f64| self.profiles.iter().copied().reduce(f).unwrap_or(1.0);
         if !self.profiles.is_empty() {
@@ -246,6 +259,39 @@ impl MeasuredErrors {
         }
         line
     }
+}
+
+/// That uncertainties whose median is `quoted` (in units of the continuum), and which are too small by a `factor`, look
+/// like variances, if they do.
+pub fn variances(quoted: f64, factor: f64) -> Option<String> {
+    let actual = factor * quoted;
+    let is_square = VARIANCES.contains(&(actual / quoted.sqrt()));
+    (factor > TOO_SMALL && is_square).then(|| {
+        format!(
+            "the uncertainties of the profiles look like variances: they are {quoted:.1e}, and the profiles scatter by \
+            {actual:.1e}, about their root. Give standard deviations, the roots of these numbers"
+        )
+    })
+}
+
+/// The median uncertainty as quoted, and by how much more than that bins scatter about a cubic through four neighbours:
+/// an upper limit to their noise, as lines that are narrow for the bins scatter likewise. `None` of short profiles.
+pub fn by_neighbours(observations: &Observations) -> Option<(f64, f64)> {
+    const CUBIC: [(usize, f64); 5] = [(0, 1.0), (1, -4.0), (2, 6.0), (3, -4.0), (4, 1.0)];
+    const NORM: f64 = 8.37;
+    /// Median of the absolute value of a Gaussian number.
+    const MEDIAN: f64 = 0.6745;
+    let of = |profile: &Profile| -> Vec<f64> {
+        let away = |bins: &[f64]| CUBIC.iter().map(|(j, weight)| weight * bins[*j]).sum::<f64>().abs() / NORM;
+        profile.intensity.windows(CUBIC.len()).map(away).collect()
+    };
+    let middle = |mut all: Vec<f64>| {
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    };
+    let scatter = middle(observations.profiles.iter().flat_map(of).collect())? / MEDIAN;
+    let quoted = middle(observations.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect())?;
+    Some((quoted, scatter / quoted))
 }
 
 /// The smallest factor on the errors with which a map comes down to 0.97 per independent datum before noise is turned

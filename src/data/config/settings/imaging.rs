@@ -13,6 +13,17 @@ const MOST_BREAK_DEGREE: f64 = 30.0;
 /// What is said of spots where one map is found.
 const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
 
+/// That what a map holds is said of a static one; the usual model need not be mentioned.
+pub(super) fn check_brightness(imaging: &mut ImagingSettings) -> Result<(), Fault> {
+    if imaging.brightness.is_some() && imaging.objective.properties().has_field {
+        let problem = "leave it out: with imaging.objective \"marginal-likelihood\", the default, spots may be brighter \
+                       or darker than the photosphere. It is for a static map, with the objective \"spottedness\"";
+        return Err(Fault::new("imaging.brightness", problem));
+    }
+    imaging.brightness = imaging.brightness.filter(|model| !model.is_default());
+    Ok(())
+}
+
 pub(super) fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
     check_pixels("imaging.pixels", imaging.pixels)?;
     check_seasons(imaging)?;

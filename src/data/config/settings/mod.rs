@@ -25,7 +25,7 @@ use crate::star::response::{self, velocity_grid};
 use crate::star::{BrightnessModel, Size, StarSettings};
 use crate::surface::Known;
 use grid::resolve_grid;
-use imaging::{check_imaging, resolve_field};
+use imaging::{check_brightness, check_imaging, resolve_field};
 use observations::resolve_sets;
 use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
@@ -78,6 +78,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
     let size = Size::of(star.rotation_period_d, written.star.vsini_kms, written.star.inclination_deg);
     size.refused().map_or(Ok(()), |(key, problem)| Err(Fault::new(key, problem)))?;
     written.plan.as_ref().map_or(Ok(()), check_plan)?;
+    check_brightness(&mut written.imaging)?;
     let sets = resolve_sets(&mut written, &star, &values, path)?;
     let light_curves = resolve_photometry(&written, path)?;
     let velocity_jitter = resolve_jitter(&mut written);
@@ -87,7 +88,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
     let free = resolve_free(&mut written, &mut values, clock)?;
     check_orbits(&free, &values, clock, written.star.mass_msun)?;
     resolve_sampler(&mut written, free.len())?;
-    if written.imaging.brightness == BrightnessModel::BrightAndDark && values.get(Parameter::Contrast).is_some() {
+    if written.imaging.brightness() == BrightnessModel::BrightAndDark && values.get(Parameter::Contrast).is_some() {
         return Err(Fault::new(
             "parameters.contrast",
             "has no effect on a bright-and-dark map, which holds the brightness itself",

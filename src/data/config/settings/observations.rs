@@ -136,7 +136,7 @@ fn check_several(written: &Config) -> Result<(), Fault> {
             let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
             return Err(Fault::new("imaging.chi2_target", problem));
         }
-        let spots = written.imaging.brightness != BrightnessModel::BrightAndDark;
+        let spots = written.imaging.brightness() != BrightnessModel::BrightAndDark;
         let own = [("contrast", section.contrast.is_some()), ("wavelength_nm", section.wavelength_nm.is_some())];
         if let Some((name, _)) = own.into_iter().find(|(_, given)| *given && sections.len() > 1 && !spots) {
             let problem = "an image of bright and dark pixels is as bright in every data set";

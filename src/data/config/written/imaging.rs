@@ -17,9 +17,10 @@ const SEASON_GAP_D: f64 = 60.0;
 pub struct ImagingSettings {
     /// Pixels of the image, 100 to 2,000,000 (approximately: rings hold whole numbers of pixels).
     pub pixels: usize,
-    /// What the pixels of the image hold.
-    #[serde(skip_serializing_if = "BrightnessModel::is_default")]
-    pub brightness: BrightnessModel,
+    /// With objectives of a static map: what its pixels hold, spots alone if not given. With "marginal-likelihood", the
+    /// default, it has no meaning: spots may be brighter or darker than the photosphere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub brightness: Option<BrightnessModel>,
     /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and
     /// dark pixels has no use for it.
     pub default_spot: f64,
@@ -64,7 +65,7 @@ impl Default for ImagingSettings {
     fn default() -> Self {
         ImagingSettings {
             pixels: 2000,
-            brightness: BrightnessModel::default(),
+            brightness: None,
             default_spot: 1e-4,
             chi2_target: Automatic::Number(0.97),
             objective: ObjectiveKind::default(),
@@ -89,9 +90,14 @@ impl ImagingSettings {
         }
     }
 
+    /// What the pixels of a static map hold.
+    pub fn brightness(&self) -> BrightnessModel {
+        self.brightness.unwrap_or_default()
+    }
+
     /// Entropy of the image.
     pub fn entropy(&self) -> Entropy {
-        match self.brightness {
+        match self.brightness() {
             BrightnessModel::Spots => Entropy::new(self.default_spot),
             BrightnessModel::BrightAndDark => Entropy::BrightAndDark,
         }

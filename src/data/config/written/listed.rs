@@ -20,12 +20,18 @@ pub trait Section: DeserializeOwned + Serialize + JsonSchema {
 /// The sections as written. A list of one is written as that one.
 #[derive(Clone, Debug)]
 pub struct Listed<T> {
+    /// The sections.
     pub sections: Vec<T>,
     /// Whether keys have the number of the section in them.
     listed: bool,
 }
 
 impl<T: Section> Listed<T> {
+    /// Of these sections, one at least.
+    pub fn of(sections: Vec<T>) -> Self {
+        Listed { listed: sections.len() > 1, sections }
+    }
+
     /// Where section `s` stands in the config.
     pub fn key(&self, s: usize) -> String {
         if self.listed { format!("{}[{s}]", T::KEY) } else { T::KEY.into() }

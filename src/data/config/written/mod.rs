@@ -17,7 +17,7 @@ pub use listed::Listed;
 pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
 pub use observations::{ObservationsSection, SimulateSection, VelocitySection};
 pub use per_parameter::{PerParameter, Planet};
-pub use photometry::{OutlierTreatment, PhotometrySection, SimulatedLight};
+pub use photometry::{OutlierTreatment, PhotometrySection, SEGMENT_GAP_D, SimulatedLight};
 pub use star::{
     Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM,
 };

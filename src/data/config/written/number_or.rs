@@ -133,6 +133,11 @@ impl Default for VelocityJitter {
     }
 }
 
+impl ZeroPoint {
+    /// Fitted.
+    pub const FITTED: Self = NumberOr::Word(FittedOffset);
+}
+
 impl Default for ZeroPoint {
     fn default() -> Self {
         NumberOr::Number(0.0)

@@ -87,6 +87,9 @@ impl Section for PhotometrySection {
     const EMPTY: &'static str = "the list is empty, leave photometry out where there is none";
 }
 
+/// A longer gap (d) begins a new segment, unless the config has another number.
+pub const SEGMENT_GAP_D: f64 = 3.0;
+
 fn default_gap_d() -> f64 {
-    3.0
+    SEGMENT_GAP_D
 }

@@ -1,5 +1,5 @@
-//! Where the continuum beside the line is, on average and in each profile: profiles whose continuum is not at 1, or
-//! wanders from one to the next, are fitted by no map.
+//! Where the continuum beside the line is, on average and in each profile: profiles whose continuum is not at 1, is
+//! tilted, or wanders from one to the next, are fitted by no map.
 
 use super::noise::Scatter;
 use crate::star::observation::{Observations, Profile};
@@ -26,14 +26,20 @@ pub struct Continuum {
     /// Standard deviation of the levels of single profiles about the mean, what their noise explains taken off; `None`
     /// where the noise explains it all.
     pub wandering: Option<f64>,
-    /// The same of half the difference of the two sides: the slope of profiles.
+    /// Root mean square of the slopes of single profiles (per km/s), what their noise explains taken off; `None` where
+    /// the noise explains it all, or none is as steep as matters.
     pub tilting: Option<f64>,
 }
+
+/// A slope matters that makes levels of the two sides differ by twice that.
+const LEAST_SLOPE: f64 = 5e-4;
 
 /// Levels of the two sides of one profile, and the variance of each.
 struct Sides {
     blue: (f64, f64),
     red: (f64, f64),
+    /// Distance of the middles of the two (km/s).
+    apart_kms: f64,
 }
 
 impl Continuum {
@@ -51,7 +57,14 @@ impl Continuum {
         };
         let (levels, slopes) = (half(1.0), half(-1.0));
         let (level, variance) = mean(&levels);
-        Some(Continuum { level, level_error: variance.sqrt(), wandering: excess(&levels), tilting: excess(&slopes) })
+        let (slope, scatter) = (mean(&slopes), excess(&slopes));
+        let common = (slope.0.abs() > ANOTHER_LEVEL.0 * slope.1.sqrt()).then_some(slope.0.abs());
+        let steep = (common.is_some() || scatter.is_some())
+            .then(|| common.unwrap_or(0.0).hypot(scatter.unwrap_or(0.0)))
+            .filter(|steep| *steep > LEAST_SLOPE);
+        let apart = sides.iter().map(|sides| sides.apart_kms).sum::<f64>() / sides.len() as f64;
+        let tilting = steep.map(|steep| 2.0 * steep / apart);
+        Some(Continuum { level, level_error: variance.sqrt(), wandering: excess(&levels), tilting })
     }
 
     /// Whether the level is another one than 1, beyond doubt and beyond what matters.
@@ -70,9 +83,11 @@ fn sides(profile: &Profile, centre_kms: f64, reach_kms: f64, larger: f64) -> Opt
         let count = bins.len() as f64;
         let level = bins.iter().map(|&j| profile.intensity[j]).sum::<f64>() / count;
         let variance = larger * bins.iter().map(|&j| profile.sigma[j].powi(2)).sum::<f64>() / count.powi(2);
-        (bins.len() >= FEWEST_BINS).then_some((level, variance))
+        let away = bins.iter().map(|&j| distance(j)).sum::<f64>() / count;
+        (bins.len() >= FEWEST_BINS).then_some(((level, variance), away))
     };
-    Some(Sides { blue: side(-1.0)?, red: side(1.0)? })
+    let ((blue, blue_kms), (red, red_kms)) = (side(-1.0)?, side(1.0)?);
+    Some(Sides { blue, red, apart_kms: blue_kms + red_kms })
 }
 
 /// Mean of values with their variances, and its variance, by their scatter where that is larger.

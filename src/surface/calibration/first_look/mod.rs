@@ -4,11 +4,13 @@
 //! Every number is a start for what the program does afterwards, and says how far it can be trusted.
 
 mod continuum;
+mod double;
 mod mean;
 mod noise;
 mod unspotted;
 
 pub use continuum::Continuum;
+pub use double::DoubleLines;
 pub use mean::{HalfDepth, MeanProfile};
 pub use noise::{Noise, Scatter};
 pub use unspotted::Unspotted;
@@ -63,6 +65,8 @@ pub struct FirstLook {
     pub range_kms: (f64, f64),
     /// The continuum beside the line.
     pub continuum: Option<Continuum>,
+    /// Level of the continuum and its error, where it is another one than 1.
+    pub level: Option<(f64, f64)>,
     /// Errors of a bin.
     pub noise: Noise,
 }
@@ -146,6 +150,11 @@ impl FirstLook {
     /// # Errors
     /// [`LookError`].
     pub fn at(observations: &Observations, line: LineModel) -> Result<Self, LookError> {
+        Self::of(observations, line, true)
+    }
+
+    /// The same of profiles whose continuum is at 1, or perhaps `elsewhere`.
+    fn of(observations: &Observations, line: LineModel, elsewhere: bool) -> Result<Self, LookError> {
         let mean = MeanProfile::of(observations)?;
         let level = mean.level();
         if !LEVELS.contains(&level) {
@@ -155,6 +164,15 @@ impl FirstLook {
         let half_depth = mean.half_depth()?;
         let fit = |line| Unspotted::fit(&mean, half_depth, line);
         let unspotted = fit(line)?;
+        let reach_kms = unspotted.reach_kms(line.instrumental_sigma_kms);
+        let continuum = Continuum::of(observations, unspotted.centre_kms, reach_kms);
+        if elsewhere
+            && continuum.is_none()
+            && let Some(level) = Self::level_of_ends(&mean, half_depth, line, &unspotted)
+        {
+            let look = FirstLook::of(&observations.clone().over_continuum(level), line, false)?;
+            return Ok(FirstLook { level: Some((level, mean.sigma)), ..look });
+        }
         let change = |line| fit(line).map(|other| (other.vsini_kms - unspotted.vsini_kms).abs());
         // towards the middle of what is possible
         let other_limb = if line.limb_darkening > 0.5 { -DOUBT.0 } else { DOUBT.0 };
@@ -165,7 +183,7 @@ impl FirstLook {
             false => change(LineModel { sigma_kms: line.sigma_kms * (1.0 - DOUBT.1), ..line })?,
         };
         let by_spots = SPOTS.0 * unspotted.vsini_kms + SPOTS.1;
-        let reach_kms = unspotted.reach_kms(line.instrumental_sigma_kms);
+        let level = continuum.filter(Continuum::is_off).map(|found| (found.level, found.level_error));
         let times = observations.times_d();
         let extreme = |f: fn(f64, f64) -> f64| times.iter().copied().reduce(f).unwrap_or(f64::NAN);
         Ok(FirstLook {
@@ -176,9 +194,17 @@ impl FirstLook {
             line_sigma_error_kms: line.is_guess.then_some(width_error),
             reach_kms,
             range_kms: mean.range_kms(),
-            continuum: Continuum::of(observations, unspotted.centre_kms, reach_kms),
+            continuum,
+            level,
             noise: Noise::of(observations, unspotted.centre_kms, reach_kms),
         })
+    }
+
+    /// Level of the continuum, by the ends of profiles that hold hardly any: another one than 1 with which the mean
+    /// profile looks more like a star than like the one `at_one`.
+    fn level_of_ends(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel, at_one: &Unspotted) -> Option<f64> {
+        let star = Unspotted::fit_between_ends(mean, half_depth, line)?;
+        (star.residual < at_one.residual && star.is_off(mean)).then_some(1.0 - star.offset)
     }
 }
 

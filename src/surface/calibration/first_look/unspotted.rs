@@ -25,6 +25,14 @@ const OUTER: f64 = 1.5;
 /// The line ends that many standard deviations of the local line beyond vsini: it is 0.1 % deep there.
 const REACH_SIGMAS: f64 = 3.0;
 
+/// A line has ended where no more than 2 % of its depth is left, that many standard deviations of the local line beyond
+/// vsini; so many bins on either side are then continuum.
+const ENDED_SIGMAS: f64 = 1.5;
+const ENDS: usize = 2;
+
+/// A continuum is off by so many errors of a bin of the mean profile, and by the second number, at least.
+const OFF: (f64, f64) = (10.0, 2e-3);
+
 /// Bins beyond the line from which its continuum can be fitted too.
 const CONTINUUM_BINS: usize = 6;
 
@@ -75,6 +83,8 @@ pub struct Unspotted {
     pub line_sigma_kms: f64,
     /// How far that may be wrong (km/s), and vsini with it; 0 where it is given.
     pub line_errors_kms: (f64, f64),
+    /// Root mean square of what it leaves of the flanks.
+    pub residual: f64,
 }
 
 impl Unspotted {
@@ -83,14 +93,35 @@ impl Unspotted {
     /// # Errors
     /// If the fit runs away: there is no rotating star in the profile.
     pub fn fit(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Result<Self, LookError> {
+        Self::of(mean, &start(mean, half_depth, line), line, false)
+    }
+
+    /// The same where the continuum is at another level than 1, and too little of it is beside the line for [`fit`] to
+    /// see that: the ends of the profile are taken for continuum. `None` where the line has not ended there.
+    ///
+    /// [`fit`]: Self::fit
+    pub fn fit_between_ends(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Option<Self> {
+        let start = Unspotted { offset: 1.0 - mean.level(), ..start(mean, half_depth, line) };
+        let found = Self::of(mean, &start, line, true).ok()?;
+        let reach = found.vsini_kms + ENDED_SIGMAS * found.line_sigma_kms.hypot(line.instrumental_sigma_kms);
+        let ((from, to), beyond) = (mean.range_kms(), ENDS as f64 * mean.step_kms);
+        (from + beyond <= found.centre_kms - reach && found.centre_kms + reach <= to - beyond).then_some(found)
+    }
+
+    fn of(mean: &MeanProfile, start: &Unspotted, line: LineModel, between_ends: bool) -> Result<Self, LookError> {
         let model = Model::new(line);
         // first with the line as it is guessed, then with what that leaves of the flanks for the noise of its width
-        let mut found = Fit::new(&model, mean, &start(mean, half_depth, line), None).run()?;
+        let mut found = Fit::new(&model, mean, start, (None, between_ends)).run()?;
         for _ in 1..PASSES {
             let noise = line.is_guess.then_some(found.1);
-            found = Fit::new(&model, mean, &found.0, noise).run()?;
+            found = Fit::new(&model, mean, &found.0, (noise, between_ends)).run()?;
         }
         Ok(found.0)
+    }
+
+    /// Whether the continuum of the mean profile is at another level than 1.
+    pub fn is_off(&self, mean: &MeanProfile) -> bool {
+        self.offset.abs() > OFF.0 * mean.sigma && self.offset.abs() > OFF.1
     }
 
     /// Distance (km/s) from the centre at which a line has ended that the spectrograph broadens by
@@ -114,6 +145,7 @@ fn start(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Unspotte
         offset: 0.0,
         line_sigma_kms: line.sigma_kms,
         line_errors_kms: (0.0, 0.0),
+        residual: 0.0,
     }
 }
 
@@ -205,14 +237,19 @@ fn shape(p: &Vector5<f64>) -> Shape {
 }
 
 impl<'a> Fit<'a> {
-    /// Bins in the flanks of the star `around` and beside them.
-    fn new(model: &'a Model, mean: &'a MeanProfile, around: &Unspotted, noise: Option<f64>) -> Self {
+    /// Bins in the flanks of the star `around` and beside them; the offset is free where the ends are continuum.
+    fn new(
+        model: &'a Model,
+        mean: &'a MeanProfile,
+        around: &Unspotted,
+        (noise, between_ends): (Option<f64>, bool),
+    ) -> Self {
         let reach = around.reach_kms(model.line.instrumental_sigma_kms);
         let fitted = FLANK * around.vsini_kms..=OUTER * reach;
         let distances: Vec<f64> =
             (0..mean.depth.len()).map(|j| (mean.velocity_kms(j) - around.centre_kms).abs()).collect();
         let continuum = distances.iter().filter(|d| (reach..=OUTER * reach).contains(*d)).count();
-        let offset = if continuum >= CONTINUUM_BINS { 1.0 } else { 0.0 };
+        let offset = if between_ends || continuum >= CONTINUUM_BINS { 1.0 } else { 0.0 };
         let Unspotted { vsini_kms, centre_kms, equivalent_width_kms, .. } = *around;
         let log_width = (around.line_sigma_kms / model.line.sigma_kms).ln();
         Fit {
@@ -269,7 +306,17 @@ impl<'a> Fit<'a> {
         let line_sigma_kms = self.model.line_sigma_kms(log_width);
         let (by_vsini, by_width) = self.errors(&here);
         let line_errors_kms = (line_sigma_kms * by_width, by_vsini);
-        let star = Unspotted { vsini_kms, centre_kms, equivalent_width_kms, offset, line_sigma_kms, line_errors_kms };
+        let bins = self.weights.iter().sum::<f64>().max(1.0);
+        let residual = (here.residual.iter().map(|r| r * r).sum::<f64>() / bins).sqrt();
+        let star = Unspotted {
+            vsini_kms,
+            centre_kms,
+            equivalent_width_kms,
+            offset,
+            line_sigma_kms,
+            line_errors_kms,
+            residual,
+        };
         Ok((star, self.unexplained(&here)))
     }
 
