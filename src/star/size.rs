@@ -14,6 +14,8 @@ pub struct Size {
     pub radius_sin_i: f64,
     /// Velocity of the equator (km/s).
     pub equator_kms: f64,
+    /// Velocity at which a star of one solar mass and this radius breaks up (km/s).
+    pub break_up_kms: f64,
     /// Least mass that holds it together at this velocity (solar masses): v^2 R / G, tides and flattening apart.
     pub least_mass: f64,
 }
@@ -29,12 +31,18 @@ impl Size {
         let radius_sin_i = vsini_kms * rotation_period_d * 86_400.0 / TAU / SUN_KM;
         let sin_i = inclination_deg.to_radians().sin();
         let equator_kms = vsini_kms / sin_i;
-        Size { radius_sin_i, equator_kms, least_mass: equator_kms.powi(2) * radius_sin_i / sin_i / SUN_BOUND }
+        let radius = radius_sin_i / sin_i;
+        Size {
+            radius_sin_i,
+            equator_kms,
+            break_up_kms: (SUN_BOUND / radius).sqrt(),
+            least_mass: equator_kms.powi(2) * radius / SUN_BOUND,
+        }
     }
 
     /// Why there is no such star: the key at fault, and what is wrong. `None` where there may be one.
     pub fn refused(&self) -> Option<(&'static str, String)> {
-        let Size { radius_sin_i, equator_kms, least_mass } = *self;
+        let Size { radius_sin_i, equator_kms, least_mass, .. } = *self;
         if equator_kms > FASTEST_KMS {
             let why = format!("the equator would turn at {equator_kms:.0} km/s, and no star does: it is in degrees");
             return Some(("star.inclination_deg", why));

@@ -304,7 +304,7 @@ fn zdipys_own_example_reaches_its_target() {
     desk.write("lopeg/inzdi.dat", &format!("{star}{fit}{rest}"));
     let table = desk.succeed(&["import", "lopeg/inzdi.dat", "--force"]);
     println!("{table}");
-    says(&table, &["tried out: ", &format!("chi^2 of {target} with errors as quoted")]);
+    says(&table, &["test fit: ", &format!("chi^2 of {target} with errors as quoted")]);
     let mut config = desk.json("star.json");
     assert_eq!(config["star"]["line"]["shape"], "voigt");
     // ZDIpy's own errors and target, in place of measured ones

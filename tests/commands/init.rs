@@ -54,7 +54,7 @@ fn the_config_is_taken_as_it_is() {
             "--rotation-period",
             "assumed, please check\n",
             "--resolving-power",
-            "note: tried out: evolving maps fit the 11 profiles with chi2 = ",
+            "note: test fit: evolving maps fit the 11 profiles with chi2 = ",
             "written: star.json\n",
             "  dimcmc map star.json --out map ",
         ],
@@ -158,7 +158,7 @@ fn wrong_errors_are_scaled() {
             });
         }
         let table = desk.succeed(&INIT);
-        says(&table, &["observations.sigma_scale", "auto", "rescaled by", "note: tried out: evolving maps fit "]);
+        says(&table, &["observations.sigma_scale", "auto", "rescaled by", "note: test fit: evolving maps fit "]);
         assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
         desk.succeed(&["map", "star.json", "--out", "map"]);
         let found = number(&desk.json("map/fit.json"), "/measured/errors/sigma_scale");
@@ -200,7 +200,7 @@ fn a_continuum_that_is_not_at_one_is_recognised() {
             "observations.continuum_level",
             "0.97",
             "the continuum beside the line is there",
-            "tried out: a brightness that varies by",
+            "test fit: a brightness that varies by",
         ],
     );
     let config = desk.json("star.json");
@@ -339,7 +339,7 @@ fn a_continuum_at_the_ends_alone_is_recognised() {
         &table,
         &[
             "observations.continuum_level",
-            "note: tried out: evolving maps fit",
+            "note: test fit: evolving maps fit",
             "as quoted: too little continuum beside the line to measure them by. Give profiles that reach farther, or",
         ],
     );
@@ -364,7 +364,7 @@ fn continua_that_are_tilted_are_let() {
     let desk = desk();
     with_rows(&desk, |_, v, i, s| (i * (1.0 + 2e-4 * v), s));
     let table = desk.succeed(&INIT);
-    says(&table, &["imaging.nuisances.continuum_slope", "more than their noise explains", "tried out: evolving maps"]);
+    says(&table, &["imaging.nuisances.continuum_slope", "more than their noise explains", "test fit: evolving maps"]);
     let config = desk.json("star.json");
     let range = &config["observations"]["velocity_range_kms"];
     let expected = 1e-4 * (range[1].as_f64().unwrap() - range[0].as_f64().unwrap());
@@ -459,7 +459,7 @@ fn several_lists_and_a_light_curve_are_joined() {
             "observations[1].resolving_power",
             "observations[1].wavelength_nm",
             "photometry.wavelength_nm",
-            "note: tried out: evolving maps fit the 19 profiles",
+            "note: test fit: evolving maps fit the 19 profiles",
         ],
     );
     let config = desk.json("star.json");

@@ -148,7 +148,7 @@ fn evolving(
     if field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
         trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| diagnosis.reason != Reason::Errors);
     }
-    trial.warnings = maps.checks.warnings.clone();
+    trial.warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().collect();
     let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());
     let of = if used < all { format!("{used} of the {all}") } else { format!("the {all}") };
     let spots = field.map_or_else(String::new, |field| {
@@ -352,12 +352,12 @@ impl Trial {
         });
         let ending = match (&self.end, &self.diagnosis) {
             (End::Untried, _) => "without a rotation period no command takes the config".into(),
-            (End::Fits(maps), None) => format!("tried out: {maps}"),
+            (End::Fits(maps), None) => format!("test fit: {maps}"),
             (End::Fits(maps), Some(diagnosis)) => {
                 let larger = self.errors.as_ref().and_then(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
                     format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
                 });
-                format!("tried out: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
+                format!("test fit: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
             }
         };
         vsini.into_iter().chain([ending]).chain(self.warnings.iter().cloned()).collect()

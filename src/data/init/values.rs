@@ -10,8 +10,8 @@ use crate::data::config::{
 };
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
-use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
+use crate::star::{BrightnessModel, Size};
 use crate::surface::calibration::first_look::{FirstLook, LineModel, LookError, Noise};
 use crate::surface::calibration::noise;
 use crate::surface::calibration::noise::MeasuredErrors;
@@ -349,13 +349,24 @@ impl Values {
             format!("vsini is given as {} km/s, the mean profile looks like {measured:.1} +- {error:.1}", given.value)
         });
         let days = self.look.span_d.1 - self.look.span_d.0;
+        let given = |value: &Option<Given<f64>>| value.as_ref().map(|given| given.value);
+        let vsini_kms = given(&known.vsini_kms).unwrap_or(measured);
+        let size = given(&known.rotation_period_d).map(|period_d| {
+            let Size { radius_sin_i, equator_kms, break_up_kms, .. } =
+                Size::of(period_d, vsini_kms, given(&known.inclination_deg).unwrap_or(assumed::INCLINATION_DEG));
+            let turns = days / period_d;
+            let few = if turns < 1.0 { ": the data span less than a rotation" } else { "" };
+            format!(
+                "R sin i = {radius_sin_i:.2} solar radii, equatorial velocity {equator_kms:.0} km/s (break-up \
+                {break_up_kms:.0} km/s for 1 solar mass), {turns:.1} rotations observed{few}"
+            )
+        });
         let shear = SOLAR_DOMEGA_RAD_D * days;
         let rigid = known.domega_rad_d.is_none() && shear > SHEAR_RAD;
         let domega = rigid.then(|| {
             format!(
-                "in {days:.1} d the equator of a star like the Sun gains {:.0} degrees on its poles: give --domega, \
-                or a prior of \
-                 domega_rad_d",
+                "Solar-like differential rotation would shear the surface by {:.0}° over {days:.1} d: set --domega or \
+                free domega_rad_d.",
                 shear.to_degrees()
             )
         });
@@ -365,7 +376,7 @@ impl Values {
                 {FEWEST_FOR_AN_ORBIT} or more"
             )
         });
-        vsini.into_iter().chain(domega).chain(few).collect()
+        size.into_iter().chain(vsini).chain(domega).chain(few).collect()
     }
 }
 
