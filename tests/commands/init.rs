@@ -397,8 +397,8 @@ fn double_lines_are_named() {
     let desk = desk();
     desk.succeed(&INIT);
     with_rows(&desk, |k, v, i, s| {
-        let away = (v - 30.0 * (1.3 * k as f64).sin()) / 9.0;
-        (i - 0.06 * (1.0 - away * away).max(0.0).sqrt(), s)
+        let away = (v - 40.0 * (1.3 * k as f64).sin()) / 14.0;
+        (i - 0.1 * (1.0 - away * away).max(0.0).sqrt(), s)
     });
     let message = desk.refusal(&[&INIT[..], &["--out", "other.json"]].concat());
     says(&message, &["`map` would find no maps of these profiles", SAID, "Take out the line of the companion"]);

@@ -11,7 +11,7 @@ use crate::star::observation::{Observations, Profile};
 const DEPTH: f64 = 0.25;
 
 /// Widths that differ by more than this part of the usual one are those of two lines.
-const DIFFERENCE: f64 = 0.2;
+const DIFFERENCE: f64 = 0.15;
 
 /// Fewest profiles that show it.
 const FEWEST: usize = 4;
