@@ -302,9 +302,9 @@ impl Detection {
             at.values.set(Parameter::K, self.best.orbit.k_kms);
             at.values.set(Parameter::PorbOverProt, self.best.porb_over_prot);
             at.values.set(Parameter::Phi, self.best.orbit.phi);
-            // held where it is wrong it would be taken for jitter
-            let constants = self.constants(at.imager, at.nuisances);
-            if let Some(vsys) = constants.and_then(|constants| constants.systemic) {
+            // beside offsets between data sets, held where it is wrong, it would be taken for jitter
+            let constants = (!at.imager.zero_points.is_empty()).then(|| self.constants(at.imager, at.nuisances));
+            if let Some(vsys) = constants.flatten().and_then(|constants| constants.systemic) {
                 at.values.set(Parameter::Vsys, vsys.value_kms);
             }
             let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
