@@ -25,6 +25,9 @@ const STAND_IN_D: f64 = 1.0;
 const PIXELS: usize = 500;
 const PROFILES: usize = 12;
 
+/// Evolving maps that leave a larger chi2 per datum than this do not fit.
+const POOR: f64 = 1.5;
+
 /// A vsini is a better one where ln Z is higher by more than this.
 const BETTER: f64 = 10.0;
 
@@ -145,8 +148,9 @@ fn evolving(
     };
     let field = maps.field.as_ref();
     let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();
-    if field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
-        trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| diagnosis.reason != Reason::Errors);
+    let poor = maps.summary.chi2_per_datum > POOR;
+    if poor || field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
+        trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| poor || diagnosis.reason != Reason::Errors);
     }
     trial.warnings = maps.checks.warnings.clone();
     let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());

@@ -1,7 +1,7 @@
 //! Lines of two stars: profiles whose line is much broader at some times than at others.
 //!
-//! Spots move the edges of a line by a few percent of its width (3 % on LO Peg, 9 % on simulated stars with the largest spots); the line
-//! of a companion that moves through that of the star, or beside it, by tens of percent.
+//! Spots move the edges of a line by a few percent of its width (3 % on LO Peg, 9 % on simulated stars with the largest
+//! spots); the line of a companion that moves through that of the star, or beside it, by tens of percent.
 
 use super::mean::MeanProfile;
 use crate::numerics::quantile::quantile;
@@ -11,7 +11,7 @@ use crate::star::observation::{Observations, Profile};
 const DEPTH: f64 = 0.25;
 
 /// Widths that differ by more than this part of the usual one are those of two lines.
-const DIFFERENCE: f64 = 0.2;
+const DIFFERENCE: f64 = 0.15;
 
 /// Fewest profiles that show it.
 const FEWEST: usize = 4;
