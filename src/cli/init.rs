@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 /// offsets of all but the first fitted.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
+    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
     demo.json\n  dimcmc init espadons/observations.txt harps/observations.txt --photometry tess.csv \\\n    \
     --rotation-period 2.741 --inclination 55 --resolving-power 65000,115000"
 )]
@@ -149,8 +149,8 @@ impl KnownArgs {
         let has_field = known.objective.as_ref().is_none_or(|given| given.value.properties().has_field);
         if has_field && self.brightness.is_some() {
             return Err(Failure::input(
-                "--brightness: leave it out: evolving maps, the default, may be brighter or darker than the photosphere. \
-                 It is for a static map, --objective spottedness",
+                "--brightness: leave it out: evolving maps, the default, may be brighter or darker than the \
+                 photosphere. It is for a static map, --objective spottedness",
             ));
         }
         if let Some(value) = self.pixels {

@@ -295,7 +295,7 @@ fn a_vsini_of_another_star_is_put_right() {
     assert!((number(&desk.json("star.json"), "/star/vsini_kms") - 25.0).abs() < 1.2);
 }
 
-/// A line that is too broad for the profiles: `init` refuses what `map` would, with the same reason, and writes nothing.
+/// A line that is too broad for the profiles: `init` refuses what `map` would, with the same reason, and writes none.
 #[test]
 fn what_map_would_refuse_is_refused_with_the_reason() {
     let desk = desk();
@@ -400,12 +400,19 @@ fn double_lines_are_named() {
         let away = (v - 40.0 * (1.3 * k as f64).sin()) / 14.0;
         (i - 0.1 * (1.0 - away * away).max(0.0).sqrt(), s)
     });
-    let message = desk.refusal(&[&INIT[..], &["--out", "other.json"]].concat());
-    says(&message, &["`map` would find no maps of these profiles", SAID, "Take out the line of the companion"]);
-    assert!(!message.contains("rotation_period") && !desk.path("other.json").exists(), "{message}");
-    let message = failure(&desk, &["map", "star.json", "--out", "map"]);
-    says(&message, &["no map (", SAID]);
-    assert!(!message.contains("rotation_period"), "{message}");
+    // few pixels may follow the companion, poorly
+    let table = desk.succeed(&[&INIT[..], &["--out", "other.json"]].concat());
+    says(&table, &["but not as well as the errors promise: the line is ", SAID, "Take out the line of the companion"]);
+    assert!(!table.contains("likely reason"), "{table}");
+    let mut config = desk.json("star.json");
+    config["imaging"]["objective"] = json!("spottedness");
+    config["imaging"]["pixels"] = json!(300);
+    config["observations"]["sigma_scale"] = json!(1.0);
+    config["observations"]["velocity_jitter_kms"] = json!(0);
+    desk.write("star.json", &config.to_string());
+    let message = desk.refusal(&["map", "star.json", "--out", "map"]);
+    says(&message, &["star.json: imaging.chi2_target: ", SAID]);
+    assert!(!message.contains("likely reason"), "{message}");
 }
 
 /// Evolving maps are as bright and as dark as the profiles say: nothing is to be chosen.

@@ -1,7 +1,7 @@
 //! Lines of two stars: profiles whose line is much broader at some times than at others.
 //!
-//! Spots move the edges of a line by a few percent of its width (3 % on LO Peg, 9 % on simulated stars with the largest spots); the line
-//! of a companion that moves through that of the star, or beside it, by tens of percent.
+//! Spots move the edges of a line by a few percent of its width (3 % on LO Peg, 9 % on simulated stars with the largest
+//! spots); the line of a companion that moves through that of the star, or beside it, by tens of percent.
 
 use super::mean::MeanProfile;
 use crate::numerics::quantile::quantile;
