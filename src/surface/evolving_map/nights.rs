@@ -82,7 +82,7 @@ impl SurfaceMaps {
                 summary.chi2_per_datum
             ));
         }
-        let other = OtherRotation::of(imager, values, &fitted, known);
+        let other = OtherRotation::of(imager, values, fitted, known);
         warnings.extend(other.iter().map(OtherRotation::sentence));
         let light = marginal.light_curves(imager);
         warnings.extend(misfits(imager, &light));
