@@ -159,5 +159,5 @@ fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
     // of one that is less fast maps are found, and said to be no good
     let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 32.0).with("observations.simulate.snr", 5000.0);
     let fit = with_profiles(Scene::new(&other).unwrap().observations).maps(None).unwrap();
-    assert!(fit.warnings.iter().any(|warning| warning.contains("do not explain the profiles")), "{:?}", fit.warnings);
+    assert!(fit.warnings.iter().any(|warning| warning.contains("do not reproduce the profiles")), "{:?}", fit.warnings);
 }

@@ -97,7 +97,7 @@ fn a_planet_of_a_star_without_spots_is_found() {
     assert!((signal.k_kms - 0.4).abs() < 3.0 * signal.sigma_k_kms, "{}", verdict.sentence);
     assert!((signal.period_d - 3.4).abs() < 0.1, "{}", verdict.sentence);
     assert!(verdict.false_alarm_probability.unwrap() < 1e-4, "{}", verdict.sentence);
-    assert!(remarks.iter().any(|r| r.text.contains("the profiles show no spots")), "{remarks:?}");
+    assert!(remarks.iter().any(|r| r.text.contains("The profiles show no spots")), "{remarks:?}");
     assert!(remarks.iter().all(|r| !r.text.contains("chi2")), "{remarks:?}");
 }
 
