@@ -24,8 +24,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
-    demo.json\n  dimcmc init espadons/observations.txt harps/observations.txt --photometry tess.csv \\\n    \
-    --rotation-period 2.741 --inclination 55 --resolving-power 65000,115000"
+    demo.json"
 )]
 pub struct Args {
     /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line. Several are

@@ -10,6 +10,7 @@ use crate::runs::manifest;
 use crate::runs::run::{CHAIN, Cost, Meter, Pace, Run, RunError, SUMMARY, StartFrom};
 use crate::sampling::ensemble::{MOST_STEPS, StopReason};
 use indicatif::{HumanDuration, ProgressBar};
+use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -96,7 +97,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     };
     signals.defer();
     let cost = Cost::of(&run);
-    if !resume && cost.time() > WORTH_SAYING {
+    if !resume && cost.time() > WORTH_SAYING && std::io::stderr().is_terminal() {
         console::note(words(&cost));
     }
     let bar = progress::bar(global, Some(BAR), "first step");

@@ -129,7 +129,7 @@ fn zero_points_are_no_planet_and_a_planet_is_no_zero_point() {
     println!("{} {}", probability(&blind), probability(&fitted));
     assert!(probability(&fitted) > 0.05, "{}", fitted["false_alarm"]);
     assert!(probability(&blind) < probability(&fitted));
-    says(&table, &["velocity jitter: ", "ln of the odds"]);
+    says(&table, &["RV jitter: ", "ln B = "]);
     // ten standard errors
     let planet = jittering(3, 0.3);
     let (found, _) = search(&planet, json!("fitted"));

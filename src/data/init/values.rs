@@ -358,7 +358,7 @@ impl Values {
             let few = if turns < 1.0 { ": the data span less than a rotation" } else { "" };
             format!(
                 "R sin i = {radius_sin_i:.2} solar radii, equatorial velocity {equator_kms:.0} km/s (break-up \
-                {break_up_kms:.0} km/s for 1 solar mass), {turns:.1} rotations observed{few}"
+                {break_up_kms:.0} km/s at 1 M_sun), {turns:.1} rotations observed{few}"
             )
         });
         let shear = SOLAR_DOMEGA_RAD_D * days;
