@@ -5,7 +5,7 @@ use dimcmc::internals::data::simulate::Simulation;
 use dimcmc::internals::model::{Parameter, ParameterValues};
 use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{LimbDarkening, LocalLine, Spot, StarSettings};
-use dimcmc::internals::surface::calibration::first_look::{FirstLook, LineModel, LookError, MeanProfile};
+use dimcmc::internals::surface::calibration::first_look::{DoubleLines, FirstLook, LineModel, LookError, MeanProfile};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -78,7 +78,9 @@ fn vsini_and_centre_are_within_their_errors() {
     for vsini in [6.0, 12.0, 25.0, 40.0, 70.0, 120.0] {
         for cap in [0.0, 20.0, 40.0] {
             for _ in 0..3 {
-                let look = FirstLook::at(&observe(vsini, cap, 0.3 * vsini + 20.0, &mut rng), LINE).unwrap();
+                let observed = observe(vsini, cap, 0.3 * vsini + 20.0, &mut rng);
+                assert_eq!(DoubleLines::of(&observed, LINE.sigma_kms), None, "{vsini} km/s, a cap of {cap}");
+                let look = FirstLook::at(&observed, LINE).unwrap();
                 // line and limb darkening are known here: what is left is what spots are said to do
                 let by_spots = 0.01 * vsini + 0.3;
                 vsini_pulls.push((look.unspotted.vsini_kms - vsini) / by_spots);

@@ -88,8 +88,8 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let trial = trial::run(&mut draft, place, &profiles, &sets[0].values, known)?;
     values::note_objective(&draft, known, &mut sets[0].ledger);
     notes.extend(trial.notes(&draft));
-    for set in &mut sets {
-        set.values.note_errors(known, trial.errors.as_ref(), &mut set.ledger);
+    for (s, set) in sets.iter_mut().enumerate() {
+        set.values.note_errors(known, trial.errors.get(s).and_then(Option::as_ref), &mut set.ledger);
     }
     Values::note_jitter(&draft, &mut sets[0].ledger);
     if trial.measured_vsini {

@@ -46,8 +46,8 @@ const MANY_SPOTS: f64 = 0.25;
 pub(super) struct Trial {
     /// How it ended.
     pub end: End,
-    /// What the profiles say of their errors, where that is left to them.
-    pub errors: Option<MeasuredErrors>,
+    /// What the profiles of each data set say of their errors, where that is left to them.
+    pub errors: Vec<Option<MeasuredErrors>>,
     /// Why no map fits as well as the errors promise, if none does.
     pub diagnosis: Option<Diagnosis>,
     /// Whether the start is an orbit, since there is no fit without one.
@@ -161,10 +161,11 @@ fn evolving(
     });
     let chi2 = maps.summary.chi2_per_datum;
     trial.end = End::Fits(format!("evolving maps fit {of} profiles with chi2 = {chi2:.2} per datum{spots}"));
-    // errors are those of all profiles; what several data sets say of them takes a fit
-    if let [one] = profiles {
-        trial.errors = self::scene(draft, place.config, std::slice::from_ref(one))?.measured.errors;
-    }
+    // errors of one data set are those of all its profiles; a scene of several takes a fit
+    trial.errors = match profiles {
+        [_] => vec![self::scene(draft, place.config, profiles)?.measured.errors],
+        _ => scene.measured.sets.iter().map(|set| set.errors.clone()).collect(),
+    };
     Ok(trial)
 }
 
@@ -237,7 +238,7 @@ fn unchanging(
         let (factor, reason) = (attempt.misfit, diagnosis.text.clone());
         return Err(ProposalError::OutOfReach { list: list.into(), factor, reason });
     }
-    trial.errors = attempt.scene.and_then(|scene| scene.measured.errors);
+    trial.errors = vec![attempt.scene.and_then(|scene| scene.measured.errors)];
     trial.end = match attempt.reached {
         Ok(spottedness) => End::Fits(spotted(spottedness, draft, trial.orbit)),
         Err(error) => {
@@ -338,7 +339,7 @@ fn spotted(spottedness: f64, draft: &Draft, orbit: bool) -> String {
 
 impl Trial {
     fn of(end: End) -> Self {
-        Trial { end, errors: None, diagnosis: None, orbit: false, measured_vsini: false, warnings: Vec::new() }
+        Trial { end, errors: Vec::new(), diagnosis: None, orbit: false, measured_vsini: false, warnings: Vec::new() }
     }
 
     /// Whether a map can be made of the config as it is.
@@ -358,9 +359,10 @@ impl Trial {
             (End::Untried, _) => "without a rotation period no command takes the config".into(),
             (End::Fits(maps), None) => format!("test fit: {maps}"),
             (End::Fits(maps), Some(diagnosis)) => {
-                let larger = self.errors.as_ref().and_then(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
-                    format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
-                });
+                let larger =
+                    self.errors.iter().flatten().find_map(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
+                        format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
+                    });
                 format!("test fit: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
             }
         };

@@ -33,6 +33,9 @@ const ENDS: usize = 2;
 /// A continuum is off by so many errors of a bin of the mean profile, and by the second number, at least.
 const OFF: (f64, f64) = (10.0, 2e-3);
 
+/// It is so far from the level of the ends at most, in units of its distance from 1.
+const SEEN: f64 = 0.3;
+
 /// Bins beyond the line from which its continuum can be fitted too.
 const CONTINUUM_BINS: usize = 6;
 
@@ -119,9 +122,11 @@ impl Unspotted {
         Ok(found.0)
     }
 
-    /// Whether the continuum of the mean profile is at another level than 1.
+    /// Whether the continuum of the mean profile is at another level than 1, as its ends show it.
     pub fn is_off(&self, mean: &MeanProfile) -> bool {
-        self.offset.abs() > OFF.0 * mean.sigma && self.offset.abs() > OFF.1
+        let off = self.offset.abs();
+        let beside_ends = (1.0 - self.offset - mean.level()).abs();
+        off > OFF.0 * mean.sigma && off > OFF.1 && beside_ends < SEEN * off
     }
 
     /// Distance (km/s) from the centre at which a line has ended that the spectrograph broadens by
