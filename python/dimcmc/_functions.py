@@ -151,7 +151,7 @@ def periodogram(
     fixed : bool
         Hold parameters that the config leaves free at its values, instead of integrating them out.
     draws : int
-        Number of stars without a planet that peaks are judged by, from 1000 to 10 million.
+        Number of planet-free Monte Carlo realisations for the FAP, from 1000 to 10 million.
     seed : int
         Seed of these draws.
     out : str or path, optional
@@ -214,7 +214,7 @@ def plan(
     maps : int
         Spot maps drawn, of which medians are taken; 0 for lines of a star without spots.
     draws : int
-        Number of stars without a planet that false alarms are taken from, from 1000 to 10 million.
+        Number of planet-free Monte Carlo realisations for the FAP, from 1000 to 10 million.
     seed : int
         Seed of both.
     out : str or path, optional

@@ -251,7 +251,7 @@ class Periodogram(Result):
 
     @property
     def summary(self) -> Record:
-        """Best orbit, peaks, false alarms, remarks (`periodogram.json`)."""
+        """Best orbit, peaks, FAP, remarks (`periodogram.json`)."""
         return self._json("periodogram.json")
 
     @property

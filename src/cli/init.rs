@@ -145,8 +145,7 @@ impl KnownArgs {
             let value = [BrightnessModel::Spots, BrightnessModel::BrightAndDark].into_iter().find(model);
             known.brightness = value.map(|value| Given { value, by: "--brightness".to_owned() });
         }
-        let has_field = known.objective.as_ref().is_none_or(|given| given.value.properties().has_field);
-        if has_field && self.brightness.is_some() {
+        if known.objective().properties().has_field && self.brightness.is_some() {
             return Err(Failure::input(
                 "--brightness: leave it out: evolving maps, the default, may be brighter or darker than the \
                  photosphere. It is for a static map, --objective spottedness",
@@ -212,7 +211,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let known = args.known.over(Known::default())?;
     let place = Place {
         config: args.output.path(),
-        lists: args.lists(&bytes)?,
+        lists: args.lists(&bytes, &known)?,
         light_curves: args.light_curves(&known)?,
         schema: args.output.schema(),
     };
@@ -229,11 +228,10 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
 
 impl Args {
     /// The lists of the contents `bytes`.
-    fn lists<'a>(&'a self, bytes: &'a [Vec<u8>]) -> Result<Vec<List<'a>>, Failure> {
+    fn lists<'a>(&'a self, bytes: &'a [Vec<u8>], known: &Known) -> Result<Vec<List<'a>>, Failure> {
         let lists = &self.observations;
         let several = lists.len() > 1;
-        let evolves = self.known.objective.as_deref().is_none_or(|name| name == ObjectiveKind::default().name());
-        if several && !evolves {
+        if several && !known.objective().properties().marginalises {
             let problem = "several lists take the objective \"marginal-likelihood\", which fits the velocity offsets \
                            between them: leave --objective out, or give one list";
             return Err(Failure::input(problem));
@@ -260,8 +258,7 @@ impl Args {
 
     /// The light curves.
     fn light_curves(&self, known: &Known) -> Result<Vec<LightCurve>, Failure> {
-        let takes = known.objective.as_ref().is_none_or(|given| given.value.properties().takes_light_curves);
-        if !takes && !self.photometry.is_empty() {
+        if !known.objective().properties().takes_light_curves && !self.photometry.is_empty() {
             let problem = "--photometry: takes the objective \"marginal-likelihood\": leave --objective out";
             return Err(Failure::input(problem));
         }

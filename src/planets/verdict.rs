@@ -84,7 +84,7 @@ impl Signal {
 
     /// Period and K with their uncertainties; K in m/s below 1 km/s.
     pub fn words(&self) -> String {
-        let (factor, unit) = if self.k_kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") };
+        let (factor, unit) = unit(self.k_kms);
         let [k, sigma] = [self.k_kms, self.sigma_k_kms].map(|kms| factor * kms);
         let digits = decimals(sigma);
         format!("P = {}, K = {k:.digits$} ± {sigma:.digits$} {unit}", self.period())
@@ -251,9 +251,14 @@ pub fn false_alarm(p: f64) -> String {
     }
 }
 
+/// What a velocity (km/s) is multiplied by to be printed, and its unit then.
+fn unit(kms: f64) -> (f64, &'static str) {
+    if kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") }
+}
+
 /// A velocity (km/s) with as many digits as its uncertainty allows, in m/s below 1 km/s.
 pub fn speed(kms: f64, sigma_kms: f64) -> String {
-    let (factor, unit) = if kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") };
+    let (factor, unit) = unit(kms);
     let digits = decimals(factor * sigma_kms);
     format!("{:.digits$} {unit}", factor * kms)
 }

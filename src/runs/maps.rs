@@ -9,7 +9,7 @@ use crate::data::scene::Scene;
 use crate::inference::detection::PlanetFree;
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
-use crate::planets::verdict::{CANDIDATE_FAP, decimals, probability};
+use crate::planets::verdict::{CANDIDATE_FAP, false_alarm};
 use crate::runs::blind_search::BlindSearchOptions;
 use crate::surface::expansion::{Nuisance, nuisances};
 use crate::surface::maps::{Deviation, ImageSummary};
@@ -75,9 +75,9 @@ impl<'a> Maps<'a> {
         match found {
             Ok(mut maps) => {
                 report("looking at the velocities");
-                let jitter_kms = maps.field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);
                 let orbit = FreeVelocities::of(scene, &maps);
-                maps.warnings.extend(orbit.as_ref().and_then(|free| free.warning(scene, jitter_kms)));
+                let warning = orbit.as_ref().and_then(|free| free.warning(scene, &maps));
+                maps.warnings.extend(warning);
                 Ok(Maps {
                     scene,
                     maps: Box::new(maps),
@@ -171,20 +171,24 @@ impl FreeVelocities {
         Some((*peak, search.false_alarm.probability(peak.orbit.delta_ln_l).value()))
     }
 
-    /// That the velocities vary as an orbit would, which the jitter of this size has taken up.
-    fn warning(&self, scene: &Scene, jitter_kms: f64) -> Option<String> {
+    /// That the velocities vary as an orbit would, which the jitter has taken up; `None` also where the maps are not
+    /// those of this star.
+    fn warning(&self, scene: &Scene, maps: &SurfaceMaps) -> Option<String> {
+        let absorbs = maps.field.as_ref().and_then(SpotField::absorbs);
+        if maps.other_rotation.is_some_and(|other| other.is_far()) || absorbs.is_some() {
+            return None;
+        }
+        let jitter_kms = maps.field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);
         let (peak, chance) = self.orbit.as_ref().filter(|(_, chance)| *chance < CANDIDATE_FAP)?;
-        let period_d = scene.imager.star.rotation_period_d * peak.porb_over_prot;
-        let digits = decimals(scene.imager.star.rotation_period_d * peak.sigma_porb_over_prot.unwrap_or(f64::NAN));
+        let signal = peak.signal(scene.imager.star.rotation_period_d);
         let absorbed = match jitter_kms {
             0.0 => String::new(),
             kms => format!("; the RV jitter of {kms:.3} km/s absorbs it"),
         };
         Some(format!(
-            "RVs without spots vary as on a circular orbit (P = {period_d:.digits$} d, K = {:.3} km/s, \
-            false-alarm probability {}){absorbed}; run `dimcmc periodogram {}`",
-            peak.orbit.k_kms,
-            probability(*chance),
+            "Spot-corrected RVs vary as on a circular orbit ({}, {}){absorbed}: run `dimcmc periodogram {}`.",
+            signal.words(),
+            false_alarm(*chance),
             scene.settings.path.display()
         ))
     }

@@ -172,15 +172,20 @@ fn other_layouts_and_no_line_file() {
     assert!(!table.contains("mass"));
     desk.succeed(&["import", "zdi/inzdi.dat", "--pixels", "300", "--out", "new.json"]);
     assert_eq!(desk.read("old.json").replace("old_obs", "new_obs"), desk.read("new.json"));
-    // strength by the file: depth x sqrt(pi) x Gaussian width; these profiles have another, and `map` would find no maps
+    // strength by the file: depth x sqrt(pi) x Gaussian width; one that fits no profiles is refused with its value
+    let strength = |depth: f64| depth * std::f64::consts::PI.sqrt() * 3.2;
     desk.write("zdi/old.dat", &with_line(&without, 23, "0"));
-    let line = ["--line", "zdi/model-voigt-line.dat"];
-    let args = [&["import", "zdi/old.dat", "--pixels", "300", "--out", "other.json"][..], &line].concat();
-    let width = 0.7 * std::f64::consts::PI.sqrt() * 3.2;
-    says(
-        &desk.refusal(&args),
-        &["`map` would find no maps", "the equivalent width of the line", &format!("\"auto\" instead of {width:.3}")],
-    );
+    let args = |out| {
+        let line = ["--line", "zdi/model-voigt-line.dat"];
+        [&["import", "zdi/old.dat", "--pixels", "300", "--out", out][..], &line].concat()
+    };
+    let message = desk.refusal(&args("other.json"));
+    let wrong = format!("\"auto\" instead of {:.3}", strength(0.7));
+    says(&message, &["`map` would find no maps", "the equivalent width of the line", &wrong]);
+    desk.edit("zdi/model-voigt-line.dat", |text| text.replace("0.70", "1.02"));
+    desk.succeed(&args("strong.json"));
+    let width = desk.json("strong.json")["star"]["line"]["equivalent_width_kms"].as_f64().unwrap();
+    assert!((width - strength(1.02)).abs() < 1e-4, "{width}");
     // without it the line is assumed, and said to be; options replace what files say
     std::fs::remove_file(desk.path("zdi/model-voigt-line.dat")).unwrap();
     let table = desk.succeed(&[

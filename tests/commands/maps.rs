@@ -47,7 +47,7 @@ fn velocities_that_vary_as_on_an_orbit_are_told() {
         assert_eq!(desk.read("map/fit.json").contains(told), k_kms > 0.0);
         assert_eq!(said.contains("run `dimcmc periodogram star.json`"), k_kms > 0.0, "{said}");
         if k_kms > 0.0 {
-            says(&said, &["; the RV jitter of 0.", " absorbs it", "false-alarm probability"]);
+            says(&said, &["; the RV jitter of 0.", " absorbs it", "FAP "]);
         }
     }
 }

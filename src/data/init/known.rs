@@ -53,7 +53,7 @@ impl Known {
     }
 
     /// What reconstructions are judged by: what is right for most stars, if nothing else is given.
-    pub(super) fn objective(&self) -> ObjectiveKind {
+    pub fn objective(&self) -> ObjectiveKind {
         self.objective.as_ref().map_or(ObjectiveKind::MarginalLikelihood, |given| given.value)
     }
 

@@ -85,7 +85,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     notes.extend(sets[0].values.notes(known, sets.iter().map(|set| set.whole.profiles.len()).sum()));
     notes.iter().for_each(|note| say(note));
     let profiles: Vec<ProfileSet> = sets.iter().map(|set| set.profiles.clone()).collect();
-    let trial = trial::run(&mut draft, place, &profiles, &sets[0].values, known)?;
+    let trial = trial::run(&mut draft, trial::Observed { place, profiles: &profiles, values: &sets[0].values, known })?;
     values::note_objective(&draft, known, &mut sets[0].ledger);
     notes.extend(trial.notes(&draft));
     for (s, set) in sets.iter_mut().enumerate() {

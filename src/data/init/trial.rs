@@ -82,19 +82,27 @@ struct Attempt {
     misfit: f64,
 }
 
+/// What a draft is tried on.
+#[derive(Clone, Copy)]
+pub(super) struct Observed<'a> {
+    /// Where the config goes, and its lists.
+    pub place: &'a Place<'a>,
+    /// The profiles of each list.
+    pub profiles: &'a [ProfileSet],
+    /// What those of the first say.
+    pub values: &'a Values,
+    /// What is known without them.
+    pub known: &'a Known,
+}
+
 /// Tries `draft` on its profiles, a set for each list. Changes vsini where the given one is far from that of the
 /// profiles and no map fits with it; of a static map the draft's start, too, where only an orbit makes a map fit. No
 /// orbit is searched for with such a vsini.
 ///
 /// # Errors
 /// Given values that make no sense; a model that has no maps of these profiles, with the likely reason.
-pub(super) fn run(
-    draft: &mut Draft,
-    place: &Place,
-    profiles: &[ProfileSet],
-    values: &Values,
-    known: &Known,
-) -> Result<Trial, ProposalError> {
+pub(super) fn run(draft: &mut Draft, observed: Observed) -> Result<Trial, ProposalError> {
+    let Observed { place, profiles, known, .. } = observed;
     if draft.star.rotation_period_d.is_none() {
         let mut stand_in = draft.clone().with_jitter(VelocityJitter::default());
         stand_in.star.rotation_period_d = Some(STAND_IN_D);
@@ -104,19 +112,13 @@ pub(super) fn run(
         return Ok(Trial::of(End::Untried));
     }
     match known.objective().properties().map_changes {
-        true => evolving(draft, place, profiles, values, known),
-        false => unchanging(draft, place, profiles, values, known),
+        true => evolving(draft, observed),
+        false => unchanging(draft, observed),
     }
 }
 
 /// The trial of maps that evolve.
-fn evolving(
-    draft: &mut Draft,
-    place: &Place,
-    profiles: &[ProfileSet],
-    values: &Values,
-    known: &Known,
-) -> Result<Trial, ProposalError> {
+fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Observed) -> Result<Trial, ProposalError> {
     let few: Vec<ProfileSet> = profiles.iter().map(|set| share(set, PROFILES)).collect();
     // what is wrong with the draft itself is said of itself
     config::from_json(to_json(draft, place.config)?.as_bytes(), place.config).map_err(SceneError::from)?;
@@ -194,10 +196,7 @@ fn no_maps(place: &Place, diagnosis: Option<Diagnosis>, error: &NoMaps) -> Propo
 /// The trial of static maps.
 fn unchanging(
     draft: &mut Draft,
-    place: &Place,
-    profiles: &[ProfileSet],
-    values: &Values,
-    known: &Known,
+    Observed { place, profiles, values, known }: Observed,
 ) -> Result<Trial, ProposalError> {
     let config = place.config;
     let mut trial = Trial::of(End::Untried);

@@ -291,11 +291,11 @@ impl Values {
         const KEY: &str = "observations.velocity_jitter_kms";
         match draft.observations.sections[0].velocity_jitter_kms.unwrap_or_default() {
             VelocityJitter::Word(_) => {
-                let remark = "measured by every command: zero points of single profiles, counted as noise";
+                let remark = "measured by every command: RV jitter of single profiles, counted as noise";
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
             }
             VelocityJitter::Number(kms) => {
-                let remark = "the profiles do not tell how much their zero points scatter";
+                let remark = "too few profiles to measure the RV jitter";
                 ledger.note(KEY, kms, "km/s", Source::Assumed, remark);
             }
         }

@@ -137,7 +137,7 @@ fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[LevelRecord]) {
         figure.text(&text, [right, lowest], Font::SMALL, Align::Left, 0.0);
     }
     if !levels.is_empty() {
-        figure.text("false alarms", [right, lowest + 8.5], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
+        figure.text("FAP", [right, lowest + 8.5], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
     }
 }
 

@@ -12,7 +12,7 @@ pub(super) fn chapter(file: &FitFile) -> Chapter {
     let mut rows = file.field.as_ref().map_or_else(Vec::new, of_field);
     rows.extend([
         ("chi2 per datum", number(fit.chi2_per_datum, 4)),
-        ("the same, had these spots lived for ever", number(fit.chi2_per_datum_unchanging, 4)),
+        ("the same, static spots", number(fit.chi2_per_datum_unchanging, 4)),
         ("data in profiles", format!("{} in {}", fit.data, fit.profiles)),
     ]);
     rows.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
@@ -34,8 +34,8 @@ pub(super) fn chapter(file: &FitFile) -> Chapter {
     let mut notes = Vec::new();
     if file.field.is_some() {
         notes.push(
-            "A map is the most probable one, and smoother than the star. Its standard deviation says where it can be \
-            believed: where it is as large as the amplitude the profiles tell nothing."
+            "A map is the most probable one, and smoother than the star. Where the \
+            posterior SD approaches the prior amplitude, the map is prior-dominated."
                 .to_owned(),
         );
     }
@@ -80,7 +80,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         true => " (at the bound of its search)",
         false => "",
     };
-    let lifetime = field.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2}"));
+    let lifetime = field.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2}"));
     vec![
         ("amplitude of the spot filling factor", number(field.spot_amplitude, 4)),
         ("slope of its spectrum", number(field.spot_slope, 3) + bound("spot_slope")),

@@ -140,7 +140,7 @@ fn period_modes(manifest: &Manifest, summary: &RunSummary) -> Table {
 fn convergence(summary: &Summary) -> (Tone, String) {
     if !summary.converged {
         let advice = summary.advice.join("; ");
-        return (Tone::Doubt, format!("The chain has not converged, its intervals are not to be quoted: {advice}."));
+        return (Tone::Doubt, format!("Not converged: do not quote intervals. {advice}."));
     }
     let all = || summary.parameters.values();
     let worst = all().filter_map(|one| one.rhat).fold(1.0, f64::max);

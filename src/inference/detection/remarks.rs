@@ -5,7 +5,7 @@ use super::{Detection, DetectionSettings, Robustness};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
-use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict, decimals};
+use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Verdict, decimals};
 use crate::surface::imaging::Imager;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
@@ -33,12 +33,7 @@ pub struct Evidence<'a> {
 impl Detection {
     /// The verdict on the best orbit, given the [`Detection::remarks`].
     pub fn verdict(&self, remarks: &[Remark]) -> Verdict {
-        let signal = Signal {
-            period_d: self.frequencies.rotation_period_d * self.best.porb_over_prot,
-            sigma_period_d: self.best.sigma_porb_over_prot.map(|sigma| self.frequencies.rotation_period_d * sigma),
-            k_kms: self.best.orbit.k_kms,
-            sigma_k_kms: self.best.orbit.sigma_k_kms,
-        };
+        let signal = self.best.signal(self.frequencies.rotation_period_d);
         match self.not_judged() {
             Some(sentence) => Verdict::not_judged(sentence),
             None => Verdict::new(self.false_alarm_probability(), signal, remarks),

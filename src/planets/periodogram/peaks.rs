@@ -10,6 +10,7 @@ use super::refine::{Maximum, Model};
 use super::rotation::{Imitation, RotationPeriods};
 use super::window::{Alias, SAME, alias};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::Signal;
 use nalgebra::{DVector, Matrix3, Vector2, Vector3};
 use std::f64::consts::TAU;
 
@@ -39,6 +40,18 @@ pub struct Peak {
     pub alias: Option<Alias>,
     /// The period of the star that it is not told from: spots imitate orbits there.
     pub imitation: Option<Imitation>,
+}
+
+impl Peak {
+    /// The orbit that a verdict is on.
+    pub fn signal(&self, rotation_period_d: f64) -> Signal {
+        Signal {
+            period_d: rotation_period_d * self.porb_over_prot,
+            sigma_period_d: self.sigma_porb_over_prot.map(|sigma| rotation_period_d * sigma),
+            k_kms: self.orbit.k_kms,
+            sigma_k_kms: self.orbit.sigma_k_kms,
+        }
+    }
 }
 
 /// Parameters (a, b, frequency) of a circular orbit.

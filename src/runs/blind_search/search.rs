@@ -137,7 +137,7 @@ fn message(stage: Stage) -> String {
         Stage::PlanetFree => "reconstructing without a planet".to_owned(),
         Stage::Change => "looking whether the star changes".to_owned(),
         Stage::Rotation => "looking at other rotation periods".to_owned(),
-        Stage::Search => "searching, false alarms".to_owned(),
+        Stage::Search => "searching, FAP simulations".to_owned(),
         Stage::BestOrbit(round) => format!("reconstructing at the best orbit, round {round}"),
         Stage::SecondPlanet => "searching for a second planet".to_owned(),
     }

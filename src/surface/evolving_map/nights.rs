@@ -82,8 +82,8 @@ impl SurfaceMaps {
                 summary.chi2_per_datum
             ));
         }
-        let other = OtherRotation::of(imager, values, fitted, known);
-        warnings.extend(other.iter().map(OtherRotation::sentence));
+        let other_rotation = OtherRotation::of(imager, values, fitted, known);
+        warnings.extend(other_rotation.iter().map(OtherRotation::sentence));
         let light = marginal.light_curves(imager);
         warnings.extend(misfits(imager, &light));
         let counted = |counted: bool| modelled.estimates.iter().filter(move |_| counted);
@@ -101,6 +101,7 @@ impl SurfaceMaps {
             checks: Checks::of_flexible(&against.residuals, &imager.profiles_of_sets(), imager.data.correlated_bins),
             warnings,
             summary,
+            other_rotation,
             here: Some(here),
         })
     }

@@ -6,14 +6,11 @@
 
 use super::interpolation::{Interpolation, Pieces};
 use super::planet::{Nonlinear, Planet};
+use super::student;
 use crate::model::{Elements, Parameter, ParameterSpace, Prior};
 use crate::surface::expansion::Expansion;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rand::{Rng, RngCore};
-use rand_distr::{ChiSquared, StandardNormal};
-
-/// Degrees of freedom of the distribution that the linear coordinates are drawn from.
-const DEGREES: f64 = 8.0;
+use rand::RngCore;
 
 /// What a quadratic in the linear coordinates is made for.
 #[derive(Clone, Debug)]
@@ -287,22 +284,14 @@ impl Conditional {
 
     /// Linear coordinates drawn from a t distribution around the mode, and ln of the density there.
     pub fn draw(&self, rng: &mut dyn RngCore) -> (DVector<f64>, f64) {
-        let normal = DVector::from_fn(self.mode.len(), |_, _| rng.sample::<f64, _>(StandardNormal));
-        let chi2: f64 = rng.sample(ChiSquared::new(DEGREES).expect("positive"));
-        let scaled = normal * (DEGREES / chi2).sqrt();
-        let log_density = self.log_t(scaled.norm_squared());
-        let step =
-            self.factor.l_dirty().tr_solve_lower_triangular(&scaled).expect("a factor has no zero on its diagonal");
-        (&self.mode + step, log_density)
+        let at = student::draw(self.mode.len(), rng);
+        let step = self.factor.l_dirty().tr_solve_lower_triangular(&at).expect("a factor has no zero on its diagonal");
+        (&self.mode + step, 0.5 * self.log_determinant + student::log_density(&at))
     }
 
     /// ln of the density with which [`Conditional::draw`] gives `y`.
     pub fn log_density(&self, y: &DVector<f64>) -> f64 {
-        self.log_t((self.factor.l_dirty().lower_triangle().tr_mul(&(y - &self.mode))).norm_squared())
-    }
-
-    fn log_t(&self, distance_squared: f64) -> f64 {
-        let degrees = DEGREES + self.mode.len() as f64;
-        0.5 * self.log_determinant - 0.5 * degrees * (distance_squared / DEGREES).ln_1p()
+        let at = self.factor.l_dirty().lower_triangle().tr_mul(&(y - &self.mode));
+        0.5 * self.log_determinant + student::log_density(&at)
     }
 }

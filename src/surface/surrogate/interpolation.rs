@@ -4,12 +4,9 @@
 //! coordinates in which the places scatter alike in all directions. It is exact at the places, and everywhere for
 //! quadratics.
 
+use super::student;
 use nalgebra::{DMatrix, DVector};
-use rand::{Rng, RngCore};
-use rand_distr::{ChiSquared, StandardNormal};
-
-/// Degrees of freedom of the distribution that places are drawn from.
-const DEGREES: f64 = 8.0;
+use rand::RngCore;
 
 /// ln L without orbits: `constant + gradient x - x information x / 2`.
 #[derive(Clone, Debug)]
@@ -92,15 +89,14 @@ impl Interpolation {
     /// A place from a t distribution with mean and covariance of the places, times `temperature`, and ln of its
     /// density.
     pub fn draw(&self, temperature: f64, rng: &mut dyn RngCore) -> (DVector<f64>, f64) {
-        let normal = DVector::from_fn(self.centre.len(), |_, _| rng.sample::<f64, _>(StandardNormal));
-        let chi2: f64 = rng.sample(ChiSquared::new(DEGREES).expect("positive"));
-        let at = normal * (DEGREES / chi2).sqrt();
-        (&self.centre + &self.factor * &at * temperature.sqrt(), log_t(&at))
+        let at = student::draw(self.centre.len(), rng);
+        (&self.centre + &self.factor * &at * temperature.sqrt(), student::log_density(&at))
     }
 
     /// ln of the density with which [`Interpolation::draw`] gives `place`.
     pub fn log_draw(&self, place: &DVector<f64>, temperature: f64) -> f64 {
-        log_t(&(self.in_units(place).expect("a factor has no zero on its diagonal") / temperature.sqrt()))
+        let at = self.in_units(place).expect("a factor has no zero on its diagonal");
+        student::log_density(&(at / temperature.sqrt()))
     }
 
     fn in_units(&self, place: &DVector<f64>) -> Option<DVector<f64>> {
@@ -113,9 +109,4 @@ impl Interpolation {
         let squares = (0..at.len()).flat_map(|i| (0..=i).map(move |j| at[i] * at[j]));
         DVector::from_vec(cubes.chain([1.0]).chain(at.iter().copied()).chain(squares).collect())
     }
-}
-
-/// ln of the density, but for a constant.
-fn log_t(at: &DVector<f64>) -> f64 {
-    -0.5 * (DEGREES + at.len() as f64) * (at.norm_squared() / DEGREES).ln_1p()
 }

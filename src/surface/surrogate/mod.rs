@@ -14,6 +14,7 @@ mod periods;
 mod planet;
 mod proposal;
 mod refinement;
+mod student;
 
 use crate::model::{Elements, Parameter, ParameterSpace};
 use crate::surface::expansion::{Expansion, free_stellar};
