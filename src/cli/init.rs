@@ -147,8 +147,8 @@ impl KnownArgs {
         }
         if known.objective().properties().has_field && self.brightness.is_some() {
             return Err(Failure::input(
-                "--brightness: leave it out: evolving maps, the default, may be brighter or darker than the \
-                 photosphere. It is for a static map, --objective spottedness",
+                "--brightness: no effect on evolving maps, which may be brighter and darker than the photosphere: \
+                 delete it, or set --objective spottedness",
             ));
         }
         if let Some(value) = self.pixels {

@@ -44,14 +44,15 @@ impl Size {
     pub fn refused(&self) -> Option<(&'static str, String)> {
         let Size { radius_sin_i, equator_kms, least_mass, .. } = *self;
         if equator_kms > FASTEST_KMS {
-            let why = format!("the equator would turn at {equator_kms:.0} km/s, and no star does: it is in degrees");
+            let why =
+                format!("implies an equatorial velocity of {equator_kms:.0} km/s: give the inclination in degrees");
             return Some(("star.inclination_deg", why));
         }
         let is_absurd = radius_sin_i > LARGEST || least_mass > HEAVIEST;
         is_absurd.then(|| {
             let why = format!(
-                "with star.vsini_kms the radius would be {radius_sin_i:.0} / sin i solar radii, and it would take \
-                {least_mass:.0} solar masses to hold it together: it is in days"
+                "implies R sin i = {radius_sin_i:.0} solar radii and a mass above {least_mass:.0} solar masses: give \
+                the period in days"
             );
             ("star.rotation_period_d", why)
         })
@@ -77,6 +78,6 @@ mod tests {
         let (key, why) = Size::of(2.741, 30.3, 0.96).refused().unwrap();
         assert!(key == "star.inclination_deg" && why.contains("1808 km/s") && why.contains("degrees"), "{why}");
         let (key, why) = Size::of(27.4 * 24.0, 130.0, 60.0).refused().unwrap();
-        assert!(key == "star.rotation_period_d" && why.contains("in days"), "{why}");
+        assert!(key == "star.rotation_period_d" && why.contains("period in days"), "{why}");
     }
 }

@@ -2,6 +2,7 @@
 //! folded with the orbit.
 
 use super::ephemeris::ephemeris;
+use super::symbols::decimals;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};
@@ -36,6 +37,8 @@ struct Curves<'a> {
     vsys_kms: f64,
     /// Rotation period of the star (d).
     rotation_period_d: f64,
+    /// Errors of K (km/s) and of the period over that of rotation, where they are known.
+    sigma: [Option<f64>; 2],
     /// What the orbit is called.
     orbit_is: &'static str,
     /// The panel of velocities without spots, where the orbit is drawn and which is folded.
@@ -74,6 +77,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         motion: state.motion,
         vsys_kms: state.vsys_kms,
         rotation_period_d: ephemeris(&fit.provenance.config).map_or(f64::NAN, |(period_d, _)| period_d),
+        sigma: [None; 2],
         orbit_is: "assumed orbit",
         orbital: 1,
     };
@@ -97,7 +101,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
 
 /// The velocities of a blind search, with the orbit that it found.
 pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure, PlotError> {
-    let OrbitRecord { k_kms, porb_over_prot, phi, period_d, .. } = file.best;
+    let OrbitRecord { k_kms, sigma_k_kms, porb_over_prot, sigma_porb_over_prot, phi, period_d, .. } = file.best;
     let motion = Motion::from(Orbit { k_kms, porb_over_prot, phi });
     // velocities count from a systemic velocity that is found
     let offset_kms = match file.systemic_velocity {
@@ -131,6 +135,7 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
         motion,
         vsys_kms: offset_kms,
         rotation_period_d: period_d / porb_over_prot,
+        sigma: [Some(sigma_k_kms), sigma_porb_over_prot],
         orbit_is: "best orbit",
         orbital: 1,
     };
@@ -214,7 +219,10 @@ impl Curves<'_> {
         panel.frame(figure, Sides::BOTH);
         let mut legend = Legend::default();
         let period_d = porb_over_prot * self.rotation_period_d;
-        let text = format!("*K* = {k_kms:.3} km/s, *P* = {period_d:.3} d = {porb_over_prot:.3} *P*_{{rot}}");
+        let digits = |sigma: Option<f64>| decimals(sigma.unwrap_or(f64::NAN));
+        let [k, ratio] = self.sigma.map(digits);
+        let days = digits(self.sigma[1].map(|sigma| sigma * self.rotation_period_d));
+        let text = format!("*K* = {k_kms:.k$} km/s, *P* = {period_d:.days$} d = {porb_over_prot:.ratio$} *P*_{{rot}}");
         legend.add(Key::Line(ORBIT), &text);
         legend.draw(figure, frame, [0.5, 0.0]);
     }

@@ -16,8 +16,8 @@ const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \
 /// That what a map holds is said of a static one; the usual model need not be mentioned.
 pub(super) fn check_brightness(imaging: &mut ImagingSettings) -> Result<(), Fault> {
     if imaging.brightness.is_some() && imaging.objective.properties().has_field {
-        let problem = "leave it out: with imaging.objective \"marginal-likelihood\", the default, spots may be \
-                       brighter or darker than the photosphere. It is for a static map, with the objective \"spottedness\"";
+        let problem = "no effect with imaging.objective \"marginal-likelihood\" (the default), whose maps may be \
+                       brighter and darker than the photosphere: delete it, or set \"spottedness\"";
         return Err(Fault::new("imaging.brightness", problem));
     }
     imaging.brightness = imaging.brightness.filter(|model| !model.is_default());
