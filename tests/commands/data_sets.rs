@@ -117,7 +117,9 @@ fn what_profiles_have_in_common_is_told_apart() {
     assert!((ab.norm() / number(&free["best"]["k_kms"]) - 1.0).abs() < 0.01, "{} {}", ab.norm(), free["best"]);
     desk.succeed(&["plot", "free"]);
     let figure = desk.read("free/figures/rv.svg");
-    let period = format!("{:.3} d = ", number(&free["best"]["period_d"]));
+    // two digits of its error
+    let digits = (1.0 - number(&free["best"]["sigma_period_d"]).log10().floor()) as usize;
+    let period = format!("{:.digits$} d = ", number(&free["best"]["period_d"]));
     assert!(figure.contains(&period) && texts(&figure).contains(&"residual (km/s)"), "{period}: {:?}", texts(&figure));
     desk.succeed(&["export", "free", "--format", "rv"]);
     says(&desk.read("free/rv/README.txt"), &["leave a constant velocity free", &format!("{vsys:.4} +- ")]);

@@ -420,7 +420,7 @@ fn double_lines_are_named() {
 fn brightness_is_for_static_maps() {
     let desk = desk();
     let refused = desk.refusal(&[&INIT[..], &["--brightness", "spots"]].concat());
-    says(&refused, &["--brightness: leave it out", "--objective spottedness"]);
+    says(&refused, &["--brightness: no effect on evolving maps", "--objective spottedness"]);
     desk.succeed(&INIT);
     let mut config = desk.json("star.json");
     assert!(config["imaging"].get("brightness").is_none());
@@ -428,7 +428,7 @@ fn brightness_is_for_static_maps() {
         config["imaging"]["brightness"] = json!(model);
         desk.write("star.json", &config.to_string());
         let refused = desk.refusal(&["map", "star.json", "--out", "map"]);
-        says(&refused, &["star.json: imaging.brightness: leave it out", "\"spottedness\""]);
+        says(&refused, &["star.json: imaging.brightness: no effect", "\"spottedness\""]);
     }
 }
 
