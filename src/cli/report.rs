@@ -1,21 +1,24 @@
-//! `dimcmc report`: one page of whatever a folder holds.
+//! `dimcmc report`: one page of a star.
 
 use super::report_lines::Report;
 use super::{Failure, Global};
 use crate::data::io::atomic;
 use crate::figures::report;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Write one HTML page of the results in FOLDER
+/// Write one HTML page of a star from the results in FOLDERs
 ///
-/// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing
-/// else and can be sent to others.
+/// The verdict, velocities, dynamic spectra, maps, periodogram, posterior and detection limits, as far as the folders
+/// hold them; assumptions, and how to cite. The page is a single file that needs nothing else and can be sent to
+/// others. Its heading is `star.name` of the config. All folders must be of one star: of the same observations, or with
+/// the same `star.name`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report runs/demo --out demo.html")]
+#[command(after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report map search limits run --out star.html")]
 pub struct Args {
-    /// Folder that another command wrote
-    folder: PathBuf,
-    /// The file; `report.html` in FOLDER if not given
+    /// Folders that other commands wrote
+    #[arg(required = true, value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
+    /// The file; if not given `report.html` in FOLDER, or beside the first of several
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Replace the file if it is there
@@ -25,7 +28,11 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
-    let file = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
+    let usual = || match &args.folders[..] {
+        [one] => one.join("report.html"),
+        several => several[0].parent().unwrap_or(Path::new("")).join("report.html"),
+    };
+    let file = args.out.clone().unwrap_or_else(usual);
     if file.is_dir() {
         return Err(Failure::input(format!("--out {}: is a folder, give the name of a file", file.display())));
     }
@@ -42,7 +49,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
             file.display()
         )));
     }
-    let page = report::report(&args.folder)?;
+    let page = report::report(&args.folders)?;
     atomic::write(&file, page.as_bytes())?;
     Report::default().line("written", file.display()).print();
     Ok(())

@@ -6,7 +6,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 /// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the star's
-/// mass (of a star with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
+/// name and mass (of a star with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -49,7 +49,7 @@ pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<D
         if let Some(map) = section.as_object_mut() {
             // a landscape has unresolved spots as the entropy has them, whatever the chain does
             let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_optional());
-            map.retain(|key, _| !free(key) && key != "unresolved_spots" && key != "mass_msun");
+            map.retain(|key, _| !free(key) && key != "unresolved_spots" && key != "mass_msun" && key != "name");
         }
         section
     };
@@ -86,10 +86,12 @@ fn decisive(resolved: &Value) -> Value {
         top.remove("$schema");
         top.remove("grid");
         top.remove("plan");
-        // two planets are stable by it or not
-        let one_planet = !has_second_planet(resolved);
-        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut).filter(|_| one_planet) {
-            star.remove("mass_msun");
+        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
+            star.remove("name");
+            // two planets are stable by the mass or not
+            if !has_second_planet(resolved) {
+                star.remove("mass_msun");
+            }
         }
         if let Some(sampler) = top.get_mut("sampler").and_then(Value::as_object_mut) {
             sampler.retain(|key, _| !["steps", "rhat", "ess"].contains(&key.as_str()));

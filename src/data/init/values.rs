@@ -154,6 +154,7 @@ impl Values {
         let vsini_kms = ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini);
         let gamma_kms = known.line_gamma_kms.as_ref().map(|given| given.value);
         let star = Star {
+            name: None,
             rotation_period_d,
             epoch_d,
             inclination_deg,

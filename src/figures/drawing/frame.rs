@@ -90,6 +90,12 @@ impl Panel {
         draw(self, figure, sides, Room::OwnWidth);
     }
 
+    /// The same with an axis of its own along the upper side; its numbers and label only if `labelled`.
+    pub fn two_axes_frame(&self, figure: &mut Figure, sides: Sides, upper: &Axis, labelled: bool) {
+        let y = y_ticks(self.frame, &self.y, Room::OwnWidth);
+        draw_with(self, figure, sides, &y, Room::OwnWidth, Some((upper, labelled)));
+    }
+
     /// The same without ticks on its sides, where heights are only relative.
     pub fn bare_y_frame(&self, figure: &mut Figure) {
         draw_without_y(self, figure, Sides::BOTH, Room::Own);
@@ -104,17 +110,20 @@ impl Panel {
 /// The frame of a panel.
 fn draw(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
     let y = y_ticks(panel.frame, &panel.y, room);
-    draw_with(panel, figure, sides, &y, room);
+    draw_with(panel, figure, sides, &y, room, None);
 }
 
 /// The frame of a panel without ticks on its sides.
 fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
-    draw_with(panel, figure, sides, &Ticks::default(), room);
+    draw_with(panel, figure, sides, &Ticks::default(), room, None);
 }
 
-fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks, room: Room) {
+/// The frame with ticks `y` on its sides and, where there is one, an axis along its upper side (its numbers and label
+/// only if asked for).
+fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks, room: Room, upper: Option<(&Axis, bool)>) {
     let frame = panel.frame;
     let x = x_ticks(frame, &panel.x, room);
+    let above = upper.map(|(axis, _)| (axis, x_ticks(frame, axis, room)));
     let mut path = Vec::new();
     let mut tick = |from: [f64; 2], by: [f64; 2]| {
         path.extend([Segment::Move(from), Segment::Line([from[0] + by[0], from[1] + by[1]])]);
@@ -123,7 +132,16 @@ fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks, room: 
         for value in values {
             let at = frame.left + panel.x.share(value) * frame.width;
             tick([at, frame.bottom()], [0.0, -length]);
-            tick([at, frame.top], [0.0, length]);
+            if above.is_none() {
+                tick([at, frame.top], [0.0, length]);
+            }
+        }
+    }
+    if let Some((axis, ticks)) = &above {
+        for (length, values) in lengths(ticks) {
+            for value in values {
+                tick([frame.left + axis.share(value) * frame.width, frame.top], [0.0, length]);
+            }
         }
     }
     for (length, values) in lengths(y) {
@@ -137,6 +155,9 @@ fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks, room: 
     figure.rect("frame", frame, Paint::stroke(PEN));
     if sides.below {
         numbers_below(figure, frame, &panel.x, &x);
+    }
+    if let (Some((axis, ticks)), Some((_, true))) = (&above, upper) {
+        numbers_above(figure, frame, axis, ticks);
     }
     if sides.left {
         numbers_left(figure, frame, &panel.y, y);
@@ -156,6 +177,15 @@ fn numbers_below(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
         figure.text(text, [at, baseline], Font::SMALL, Align::Centre, 0.0);
     }
     let at = [frame.centre()[0], baseline + GAP + LABEL_PT];
+    figure.text(&axis.label, at, Font::LABEL, Align::Centre, 0.0);
+}
+
+fn numbers_above(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
+    for (value, text) in &ticks.major {
+        let at = frame.left + axis.share(*value) * frame.width;
+        figure.text(text, [at, frame.top - GAP], Font::SMALL, Align::Centre, 0.0);
+    }
+    let at = [frame.centre()[0], frame.top - 2.0 * GAP - CAPITAL * SMALL_PT];
     figure.text(&axis.label, at, Font::LABEL, Align::Centre, 0.0);
 }
 
@@ -180,17 +210,18 @@ impl Shade {
         draw_right(figure, frame, &Axis::linear(label, [self.low, self.high]));
     }
 
-    /// The same, lying in `frame`, its ticks below.
+    /// The same, lying in `frame`, its ticks below; numbers rise to the right.
     pub fn lying_bar(&self, figure: &mut Figure, frame: Rect, label: &str) {
         self.gradient(figure, frame, false);
-        draw_below(figure, frame, &Axis::linear(label, [self.low, self.high]));
+        draw_below(figure, frame, &Axis::linear(label, [self.low.min(self.high), self.low.max(self.high)]));
     }
 
     fn gradient(&self, figure: &mut Figure, frame: Rect, upright: bool) {
         const STEPS: usize = 100;
         let Rect { left, top, width, height } = frame;
         for k in 0..STEPS {
-            let colour = self.map.at((k as f64 + 0.5) / STEPS as f64);
+            let share = (k as f64 + 0.5) / STEPS as f64;
+            let colour = self.map.at(if upright || self.high >= self.low { share } else { 1.0 - share });
             let (from, part) = (k as f64 / STEPS as f64, 1.0 / STEPS as f64);
             let cell = match upright {
                 true => Rect { left, width, top: top + height * (1.0 - from - part), height: height * part },

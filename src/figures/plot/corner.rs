@@ -3,7 +3,7 @@
 //! axis.
 
 use super::density::Density;
-use super::symbols::{Title, decimals, label, short_label};
+use super::symbols::{Shown, Title};
 use super::trace::{Sampled, TRUTH, shown_range};
 use crate::figures::drawing::colour::{BLACK, BLUE, WHITE};
 use crate::figures::drawing::panel::Sides;
@@ -14,7 +14,7 @@ use crate::figures::drawing::{
 
 /// A triangle of panels.
 pub(super) struct Corner<'a> {
-    pub names: &'a [String],
+    pub shown: &'a [Shown],
     /// From where to where each parameter is shown.
     pub ranges: Vec<[f64; 2]>,
     /// How its values become lengths.
@@ -37,7 +37,7 @@ impl Corner<'_> {
         pair: impl Fn(&mut Figure, &Panel, usize, usize),
         legend: &Legend,
     ) -> Figure {
-        let n = self.names.len();
+        let n = self.shown.len();
         let size = match n {
             1 => COLUMN_MM,
             2 => 110.0,
@@ -50,8 +50,8 @@ impl Corner<'_> {
         let titles = titles(&self.titles, side);
         let top = 8.0 + 9.0 * titles.iter().map(Vec::len).max().unwrap_or(1) as f64;
         let height = (figure.height - top - MARGIN[1] - gap * (n as f64 - 1.0)) / n as f64;
-        let named = if n > 5 { short_label } else { label };
-        let axis = |i: usize| Axis { label: named(&self.names[i]), range: self.ranges[i], scale: self.scales[i] };
+        let named = if n > 3 { Shown::short_label } else { Shown::label };
+        let axis = |i: usize| Axis { label: named(&self.shown[i]), range: self.ranges[i], scale: self.scales[i] };
         for (row, title) in titles.iter().enumerate() {
             for column in 0..=row {
                 let frame = Rect {
@@ -140,22 +140,28 @@ pub(super) fn area_colours() -> [crate::figures::drawing::Colour; 2] {
 /// The corner plot of a chain.
 pub(super) fn figure(sampled: &Sampled) -> Figure {
     let names = &sampled.summary.names;
-    let draws: Vec<Vec<f64>> = (0..names.len()).map(|i| sampled.draws(i)).collect();
-    let range = |i: usize| shown_range(&draws[i], sampled.bounds(i), sampled.near_truth(i), sampled.scale(i));
-    let title = |name: &String| {
-        let one = &sampled.summary.parameters[name];
+    let shown: Vec<Shown> = (0..names.len()).map(|i| sampled.shown(i)).collect();
+    let scaled = |i: usize, values: Vec<f64>| values.into_iter().map(|x| shown[i].factor * x).collect();
+    let draws: Vec<Vec<f64>> = (0..names.len()).map(|i| scaled(i, sampled.draws(i))).collect();
+    let range = |i: usize| {
+        let factor = shown[i].factor;
+        let also = sampled.near_truth(i).map(|x| factor * x);
+        shown_range(&draws[i], sampled.bounds(i).map(|x| factor * x), also, sampled.scale(i))
+    };
+    let title = |i: usize| {
+        let one = &sampled.summary.parameters[&names[i]];
         let errors = [one.median - one.ci68[0], one.ci68[1] - one.median];
         match one.unconstrained {
-            true => Title::unconstrained(name),
-            false => Title::value(name, one.median, errors, decimals(one.sd)),
+            true => Title::unconstrained(&shown[i]),
+            false => Title::value(&shown[i], one.median, errors, one.sd),
         }
     };
     let corner = Corner {
-        names,
+        shown: &shown,
         ranges: (0..names.len()).map(range).collect(),
         scales: (0..names.len()).map(|i| sampled.scale(i)).collect(),
-        truth: (0..names.len()).map(|i| sampled.truth(i)).collect(),
-        titles: names.iter().map(title).collect(),
+        truth: (0..names.len()).map(|i| Some(shown[i].factor * sampled.truth(i)?)).collect(),
+        titles: (0..names.len()).map(title).collect(),
     };
     let mut legend = Legend::default();
     legend.add(Key::Area(area_colours()[1]), "68 % of the posterior");
@@ -165,7 +171,8 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
     }
     let diagonal = |figure: &mut Figure, frame: Rect, x: Axis, i: usize| {
         let one = &sampled.summary.parameters[&names[i]];
-        histogram(figure, frame, x, &draws[i], (!one.unconstrained).then_some(one.ci68));
+        let ci68 = one.ci68.map(|end| shown[i].factor * end);
+        histogram(figure, frame, x, &draws[i], (!one.unconstrained).then_some(ci68));
     };
     let pair = |figure: &mut Figure, panel: &Panel, i: usize, j: usize| {
         // a share of the panel is what a density on a logarithmic axis is by

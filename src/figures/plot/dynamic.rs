@@ -16,9 +16,9 @@ const RESIDUAL: f64 = 4.0;
 pub(super) fn figure(lines: &[Line]) -> Figure {
     let mut figure = Figure::new("residuals", PAGE_MM, 92.0);
     figure.caption =
-        "Dynamic spectra: observed and modelled profiles minus the mean observed profile (of its data set), \
-                      and observed minus modelled in units of the standard error. Rows are profiles, at their rotation \
-                      phases; phases that were not observed are grey."
+        "Dynamic spectra: observed and modelled profiles minus the mean observed profile (of its data set), and \
+        residuals in units of the uncertainty. Rows are profiles at their rotation phases; phases that were not \
+        observed are grey."
             .into();
     let means: Vec<Vec<f64>> = lines.iter().map(|line| mean(lines, line)).collect();
     let largest = lines
@@ -66,7 +66,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         figure.text(title, [frame.centre()[0], 10.0], Font::LABEL, Align::Centre, 0.0);
         match k {
             1 => shade.upright_bar(&mut figure, frame, "% of the continuum"),
-            2 => shade.upright_bar(&mut figure, frame, "standard errors"),
+            2 => shade.upright_bar(&mut figure, frame, "uncertainties (σ)"),
             _ => {}
         }
     }

@@ -1,6 +1,8 @@
-//! Maps of a star that changes: a strip of them, below each its standard deviation.
+//! Maps of a star that changes: one for each night, and the mean standard deviation, in flattened polar projection
+//! and in Mollweide's.
 
 use super::projection::{Projection, SOUTHERNMOST_DEG};
+use super::star_map::{degrees, parallels, rotation_arrow};
 use super::surface::{PixelMap, Scale, graticule, photosphere};
 use super::{ANY, PlotError, velocities};
 use crate::data::io::csv::Columns;
@@ -11,181 +13,317 @@ use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, 
 use crate::surface::SpotField;
 use std::path::Path;
 
-/// Most maps of a strip.
-const MOST: usize = 12;
-
-/// Most maps side by side.
-const COLUMNS: usize = 6;
-
-/// Width of the widest map with what is around it (pt).
-const WIDEST: f64 = 160.0;
-
 /// Profiles no further from a map's time than this (d) are of the same night.
 const SAME_NIGHT_D: f64 = 0.5;
 
 /// Pixels of the whole star in a picture of 1 pt of radius: finer ones are not seen.
-const PIXELS_PER_PT2: f64 = 1.0;
+const PIXELS_PER_PT2: f64 = 1.5;
+
+/// Numbers around small maps.
+const TINY: Font = Font { size: 5.5, colour: BLACK };
 
 /// One of the maps.
-struct Strip {
+struct Night {
     time_d: f64,
-    filling: Vec<f64>,
-    sd: Vec<f64>,
+    filling: PixelMap,
 }
 
-/// What the pictures have in common.
-struct Common {
-    filling: Scale,
-    sd: Scale,
-    radius: f64,
+/// All maps with what they have in common.
+pub(super) struct Nights {
+    maps: Vec<Night>,
+    /// Mean standard deviation of the filling factors.
+    sd: PixelMap,
+    filling_scale: Scale,
+    sd_scale: Scale,
     inclination_deg: f64,
     /// Times (d) and rotation cycles of the profiles.
     observed: Vec<[f64; 2]>,
+    field: SpotField,
 }
 
-/// The maps in `folder`, which `file` holds.
-pub(super) fn figure(folder: &Path, file: &MapFile) -> Result<Figure, PlotError> {
-    let pixels: usize = file.ring_pixels.iter().sum();
-    let wrong = |problem: &str| PlotError::Content { path: folder.join(MAP), problem: problem.into() };
-    let of_time = |map: &MapAt| {
-        let (MapColumns::Spots { spot_filling, .. }, Some(sd)) = (&map.pixels, &map.sigma_spot_filling) else {
-            return None;
+impl Nights {
+    /// The maps in `folder`, which `file` holds.
+    pub fn read(folder: &Path, file: &MapFile) -> Result<Self, PlotError> {
+        let pixels: usize = file.ring_pixels.iter().sum();
+        let wrong = |problem: &str| PlotError::Content { path: folder.join(MAP), problem: problem.into() };
+        let of_time = |map: &MapAt| {
+            let (MapColumns::Spots { spot_filling, .. }, Some(sd)) = (&map.pixels, &map.sigma_spot_filling) else {
+                return None;
+            };
+            let is_whole = spot_filling.len() == pixels && sd.len() == pixels && pixels > 0;
+            let filling = PixelMap { ring_pixels: file.ring_pixels.clone(), values: spot_filling.clone() };
+            is_whole.then(|| (Night { time_d: map.time_d.unwrap_or(0.0), filling }, sd.clone()))
         };
-        let is_whole = spot_filling.len() == pixels && sd.len() == pixels && pixels > 0;
-        is_whole.then(|| Strip { time_d: map.time_d.unwrap_or(0.0), filling: spot_filling.clone(), sd: sd.clone() })
-    };
-    let Some(maps) = file.maps.iter().map(of_time).collect::<Option<Vec<Strip>>>() else {
-        return Err(wrong("ring_pixels, spot_filling and sigma_spot_filling do not belong together"));
-    };
-    let (Some(field), false) = (&file.field, maps.is_empty()) else { return Err(wrong("holds no map")) };
-    let shown = evenly(maps.len());
-    let columns = shown.len().min(COLUMNS);
-    let mut figure = Figure::new("maps", PAGE_MM, 100.0);
-    let cell = ((figure.width - MARGIN) / columns as f64).min(WIDEST);
-    let common = common(folder, (file, field, &maps), &shown, 0.5 * cell - 9.0)?;
-    let block = 4.0 * common.radius + 44.0;
-    figure.height = block * shown.len().div_ceil(columns) as f64 + 40.0;
-    figure.caption = caption(maps.len(), field, shown.len());
-    for (k, map) in shown.iter().map(|k| &maps[*k]).enumerate() {
-        let (row, column) = (k / columns, k % columns);
+        let Some(read) = file.maps.iter().map(of_time).collect::<Option<Vec<_>>>() else {
+            return Err(wrong("ring_pixels, spot_filling and sigma_spot_filling do not belong together"));
+        };
+        let (maps, errors): (Vec<Night>, Vec<Vec<f64>>) = read.into_iter().unzip();
+        let (Some(field), false) = (&file.field, maps.is_empty()) else { return Err(wrong("holds no map")) };
+        let mean = |k: usize| errors.iter().map(|sd| sd[k]).sum::<f64>() / errors.len() as f64;
+        let sd = PixelMap { ring_pixels: file.ring_pixels.clone(), values: (0..pixels).map(mean).collect() };
+        let observed = match folder.join(velocities::FILE) {
+            table if table.is_file() => {
+                let table = Columns::read(&table)?;
+                let (times, cycles) = (table.column_within("time_d", ANY)?, table.column_within("cycle", ANY)?);
+                times.iter().zip(cycles).map(|(time, cycle)| [*time, *cycle]).collect()
+            }
+            _ => Vec::new(),
+        };
+        let reach = reach(maps.iter().flat_map(|map| &map.filling.values));
+        let lowest = sd.values.iter().copied().fold(f64::MAX, f64::min);
+        let amplitude = field.spot_amplitude;
+        Ok(Nights {
+            // spots dark, what is brighter than the photosphere blue
+            filling_scale: Scale {
+                shade: Shade { map: ColourMap::Brightness, low: reach, high: -reach },
+                photosphere: 0.0,
+            },
+            sd_scale: Scale {
+                // from the next tenth of the amplitude below what is known best
+                shade: Shade {
+                    map: ColourMap::Cividis,
+                    low: amplitude * (10.0 * lowest / amplitude).floor().clamp(0.0, 9.0) / 10.0,
+                    high: amplitude,
+                },
+                photosphere: amplitude,
+            },
+            maps,
+            sd,
+            inclination_deg: file.parameters.state().inclination.to_degrees(),
+            observed,
+            field: field.clone(),
+        })
+    }
+
+    /// Colours of the filling factors.
+    pub fn scale(&self) -> Scale {
+        self.filling_scale
+    }
+
+    /// Times (d) with their maps.
+    pub fn maps(&self) -> impl Iterator<Item = (f64, &PixelMap)> {
+        self.maps.iter().map(|map| (map.time_d, &map.filling))
+    }
+
+    /// The figures.
+    pub fn figures(&self) -> Vec<Figure> {
+        vec![self.draw(Kind::Polar), self.draw(Kind::Mollweide)]
+    }
+
+    fn draw(&self, kind: Kind) -> Figure {
+        // the last panel is the standard deviation
+        let panels = self.maps.len() + 1;
+        let columns = kind.columns(panels);
+        let mut figure = Figure::new(kind.name(), PAGE_MM, 100.0);
+        let cell = ((figure.width - MARGIN) / columns as f64).min(WIDEST);
+        let (radius, block) = kind.measures(cell);
+        let rows = panels.div_ceil(columns);
+        figure.height = block * rows as f64 + 44.0;
+        figure.caption = self.caption(kind);
         let left = MARGIN + 0.5 * (figure.width - MARGIN - cell * columns as f64);
-        let x = left + cell * (column as f64 + 0.5);
-        let top = block * row as f64;
-        let centres = [1.0, 3.0].map(|n| [x, top + 16.0 + n * common.radius + 5.0 * n]);
-        figure.text(&format!("{:.2} d", map.time_d), [x, top + 10.0], Font::LABEL, Align::Centre, 0.0);
-        for (values, scale, centre) in [(&map.filling, common.filling, centres[0]), (&map.sd, common.sd, centres[1])] {
-            let pixels = PixelMap { ring_pixels: file.ring_pixels.clone(), values: values.clone() };
-            common.paint(&mut figure, &pixels, scale, centre);
-            common.phases(&mut figure, map.time_d, centre);
-        }
-        if column == 0 {
-            for (text, centre) in ["most probable", "standard dev."].into_iter().zip(centres) {
-                figure.text(text, [left - 3.0, centre[1]], Font::SMALL, Align::Centre, 90.0);
+        for k in 0..panels {
+            let (row, column) = (k / columns, k % columns);
+            let place = [left + cell * (column as f64 + 0.5), block * row as f64];
+            let (title, pixels, scale) = match self.maps.get(k) {
+                Some(map) => (format!("{:.2} d", map.time_d), &map.filling, self.filling_scale),
+                None => ("mean standard deviation".to_owned(), &self.sd, self.sd_scale),
+            };
+            figure.text(&title, [place[0], place[1] + 9.0], Font::SMALL, Align::Centre, 0.0);
+            let times = self.maps.get(k).map(|map| map.time_d);
+            let is_labelled = k == 0 || k + 1 == panels;
+            match kind {
+                Kind::Polar => {
+                    let centre = [place[0], place[1] + 23.0 + radius];
+                    let projection = Projection::Polar { centre, radius };
+                    self.paint(&mut figure, pixels, projection, scale);
+                    self.around(&mut figure, times, (centre, radius), is_labelled);
+                }
+                Kind::Mollweide => {
+                    let centre = [place[0], place[1] + 14.0 + radius];
+                    self.paint(&mut figure, pixels, Projection::Mollweide { centre, radius }, scale);
+                    let sides = [column == 0, k + columns >= panels];
+                    self.beside(&mut figure, times, (centre, radius), sides);
+                }
             }
         }
+        self.bars(&mut figure);
+        figure
     }
-    bars(&mut figure, &common);
-    Ok(figure)
-}
 
-/// Room to the left (pt).
-const MARGIN: f64 = 14.0;
-
-/// At most [`MOST`] of `n`, evenly chosen, the first and the last among them.
-fn evenly(n: usize) -> Vec<usize> {
-    match n <= MOST {
-        true => (0..n).collect(),
-        false => (0..MOST).map(|k| (k * (n - 1) + (MOST - 1) / 2) / (MOST - 1)).collect(),
+    fn caption(&self, kind: Kind) -> String {
+        let count = match self.maps.len() {
+            1 => "The map".to_owned(),
+            all => format!("{all} maps"),
+        };
+        let life = match self.field.spot_lifetime_d {
+            Some(days) => format!("with spots that live {days:.1} d"),
+            None => "with static spots".to_owned(),
+        };
+        let how = match kind {
+            Kind::Polar => {
+                "Flattened polar projection down to latitude −30°: parallels at +60°, +30° and 0° (bold). Numbers \
+                outside are the rotation phases at which a meridian faces the observer, ticks the phases observed \
+                within half a day; arrows show the sense of rotation."
+            }
+            Kind::Mollweide => {
+                "Mollweide projection; longitude = 360° (1 − phase). Ticks below are the longitudes that faced the \
+                observer within half a day."
+            }
+        };
+        format!(
+            "{count} of a star {life}: most probable spot filling factor; negative where brighter than the \
+            photosphere. Last: standard deviation, the mean over all maps; {:.2} where the profiles do not constrain \
+            the map. {how} Latitudes that are never visible are grey.",
+            self.field.spot_amplitude
+        )
     }
-}
 
-fn common(
-    folder: &Path,
-    (file, field, maps): (&MapFile, &SpotField, &[Strip]),
-    shown: &[usize],
-    radius: f64,
-) -> Result<Common, PlotError> {
-    let highest = shown.iter().flat_map(|k| &maps[*k].filling).fold(0.0, |high: f64, x| high.max(x.abs()));
-    let reach = if highest > 0.5 { 1.0 } else { ((10.0 * highest).ceil() / 10.0).max(0.1) };
-    let lowest = shown.iter().flat_map(|k| &maps[*k].sd).fold(f64::MAX, |low, x| low.min(*x));
-    let amplitude = field.spot_amplitude;
-    let observed = match folder.join(velocities::FILE) {
-        table if table.is_file() => {
-            let table = Columns::read(&table)?;
-            let (times, cycles) = (table.column_within("time_d", ANY)?, table.column_within("cycle", ANY)?);
-            times.iter().zip(cycles).map(|(time, cycle)| [*time, *cycle]).collect()
-        }
-        _ => Vec::new(),
-    };
-    Ok(Common {
-        // spots dark, what is brighter than the photosphere blue
-        filling: Scale { shade: Shade { map: ColourMap::Brightness, low: reach, high: -reach }, photosphere: 0.0 },
-        sd: Scale {
-            // from the next tenth of the amplitude below what is known best
-            shade: Shade {
-                map: ColourMap::Cividis,
-                low: amplitude * (10.0 * lowest / amplitude).floor().clamp(0.0, 9.0) / 10.0,
-                high: amplitude,
-            },
-            photosphere: amplitude,
-        },
-        radius,
-        inclination_deg: file.parameters.state().inclination.to_degrees(),
-        observed,
-    })
-}
-
-fn caption(maps: usize, field: &SpotField, shown: usize) -> String {
-    let of = match maps {
-        all if all > shown => format!("{shown} of {all} maps, evenly chosen in time"),
-        1 => "The map".to_owned(),
-        all => format!("{all} maps"),
-    };
-    let life = match field.spot_lifetime_d {
-        Some(days) => format!("whose spots live some {days:.1} d"),
-        None => "that does not change".to_owned(),
-    };
-    format!(
-        "{of} of a star {life}. Above: the most probable spot filling factor; below 0 it is brighter than the \
-        photosphere. Below: its standard deviation, which is {:.2} where the profiles tell nothing. Flattened polar \
-        projection down to -30 degrees, longitude 0 at the bottom, longitudes grow anticlockwise; parallels at +60, \
-        +30 and 0 (bold). Ticks outside are the rotation phases observed within half a day. What is always below the \
-        horizon is grey.",
-        field.spot_amplitude
-    )
-}
-
-impl Common {
-    fn paint(&self, figure: &mut Figure, pixels: &PixelMap, scale: Scale, centre: Point) {
-        let projection = Projection::Polar { centre, radius: self.radius };
+    fn paint(&self, figure: &mut Figure, pixels: &PixelMap, projection: Projection, scale: Scale) {
         photosphere(figure, projection, scale);
-        pixels.coarser((PIXELS_PER_PT2 * self.radius * self.radius) as usize).paint(figure, projection, scale);
-        let unseen = [SOUTHERNMOST_DEG, -self.inclination_deg];
+        let (finest, southernmost) = match projection {
+            Projection::Polar { radius, .. } => (PIXELS_PER_PT2 * radius * radius, SOUTHERNMOST_DEG),
+            Projection::Mollweide { radius, .. } => (2.0 * PIXELS_PER_PT2 * radius * radius, -90.0),
+        };
+        pixels.coarser(finest as usize).paint(figure, projection, scale);
+        let unseen = [southernmost, -self.inclination_deg];
         if unseen[1] > unseen[0] {
             figure.polygon("unseen", &projection.patch([0.0, 360.0], unseen), Paint::fill(GREY));
         }
         graticule(figure, projection);
     }
 
-    /// Ticks at the rotation phases that were observed in the night of a time (d).
-    fn phases(&self, figure: &mut Figure, time_d: f64, centre: Point) {
-        for [_, cycle] in self.observed.iter().filter(|[time, _]| (time - time_d).abs() <= SAME_NIGHT_D) {
-            let (sin, cos) = (-360.0 * cycle).to_radians().sin_cos();
-            let at = |distance: f64| [centre[0] + distance * sin, centre[1] + distance * cos];
-            let tick = [at(self.radius + 0.8), at(self.radius + 4.5)];
+    /// Rotation cycles observed in the night of a time (d).
+    fn cycles_of(&self, time_d: Option<f64>) -> impl Iterator<Item = f64> {
+        let near = move |time: f64| time_d.is_some_and(|of| (time - of).abs() <= SAME_NIGHT_D);
+        self.observed.iter().filter(move |[time, _]| near(*time)).map(|[_, cycle]| *cycle)
+    }
+
+    /// What is around a polar map: phases, those observed, latitudes, and the sense of rotation.
+    fn around(&self, figure: &mut Figure, time_d: Option<f64>, (centre, radius): (Point, f64), is_labelled: bool) {
+        let toward = |phase: f64, distance: f64| {
+            let (sin, cos) = (-360.0 * phase).to_radians().sin_cos();
+            [centre[0] + distance * sin, centre[1] + distance * cos]
+        };
+        for cycle in self.cycles_of(time_d) {
+            let tick = [toward(cycle, radius + 0.8), toward(cycle, radius + 4.5)];
             figure.path("observed-phase", open(&tick), Paint::stroke(Stroke::new(BLACK, 0.7)));
+        }
+        for (phase, text, align, down) in [
+            (0.0, "phase 0", Align::Centre, 4.5),
+            (0.25, "0.25", Align::Right, 2.0),
+            (0.5, "0.5", Align::Centre, -0.5),
+            (0.75, "0.75", Align::Left, 2.0),
+        ] {
+            let at = toward(phase, radius + 5.5);
+            let text = if is_labelled { text } else { text.trim_start_matches("phase ") };
+            figure.text(text, [at[0], at[1] + down], TINY, align, 0.0);
+        }
+        if is_labelled {
+            parallels(figure, Projection::Polar { centre, radius }, &[60.0, 30.0, 0.0], TINY);
+        }
+        let corner = [centre[0] + 0.86 * radius, centre[1] + 0.86 * radius];
+        rotation_arrow(figure, corner, 4.0, if is_labelled { "rotation" } else { "" });
+    }
+
+    /// What is beside a map in Mollweide's projection: latitudes to the left, longitudes below.
+    fn beside(
+        &self,
+        figure: &mut Figure,
+        time_d: Option<f64>,
+        (centre, radius): (Point, f64),
+        [left, below]: [bool; 2],
+    ) {
+        let projection = Projection::Mollweide { centre, radius };
+        let bottom = centre[1] + radius;
+        for cycle in self.cycles_of(time_d) {
+            let x = projection.place((-360.0 * cycle).rem_euclid(360.0), 0.0)[0];
+            let tick = open(&[[x, bottom + 1.5], [x, bottom + 5.0]]);
+            figure.path("observed-phase", tick, Paint::stroke(Stroke::new(BLACK, 0.7)));
+        }
+        if left {
+            for latitude in [-60.0, -30.0, 0.0, 30.0, 60.0_f64] {
+                let [x, y] = projection.place(0.0, latitude);
+                let at = [x - 2.0 - latitude.abs() / 16.0, y + 2.0];
+                figure.text(&degrees(latitude), at, TINY, Align::Right, 0.0);
+            }
+        }
+        if below {
+            for longitude in [0.0, 90.0, 180.0, 270.0, 360.0] {
+                let at = [projection.place(longitude, 0.0)[0], bottom + 11.5];
+                figure.text(&format!("{longitude}°"), at, TINY, Align::Centre, 0.0);
+            }
+        }
+    }
+
+    fn bars(&self, figure: &mut Figure) {
+        let (half, top) = (0.5 * figure.width, figure.height - 30.0);
+        for (middle, scale, label) in [
+            (0.5 * half, self.filling_scale, "spot filling factor"),
+            (1.5 * half, self.sd_scale, "standard deviation of the filling factor"),
+        ] {
+            let bar = Rect { left: middle - 70.0, top, width: 140.0, height: 6.0 };
+            scale.shade.lying_bar(figure, bar, label);
         }
     }
 }
 
-fn bars(figure: &mut Figure, common: &Common) {
-    let (half, top) = (0.5 * figure.width, figure.height - 30.0);
-    for (middle, scale, label) in [
-        (0.5 * half, common.filling, "spot filling factor"),
-        (1.5 * half, common.sd, "standard deviation of the filling factor"),
-    ] {
-        let bar = Rect { left: middle - 70.0, top, width: 140.0, height: 6.0 };
-        scale.shade.lying_bar(figure, bar, label);
+/// Room to the left (pt).
+const MARGIN: f64 = 12.0;
+
+/// Width of the widest map with what is around it (pt).
+const WIDEST: f64 = 165.0;
+
+/// Share of the pixels whose values have colours of their own: single ones beyond have that of the end.
+const SHOWN: f64 = 0.999;
+
+/// How far the scale of colours reaches to either side of 0: in steps of 0.05.
+fn reach<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let mut sizes: Vec<f64> = values.map(|x| x.abs()).filter(|x| x.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let highest = sizes.get(((sizes.len() as f64 - 1.0) * SHOWN).ceil().max(0.0) as usize).copied().unwrap_or(0.0);
+    ((20.0 * highest - 1e-9).ceil() / 20.0).clamp(0.05, 1.0)
+}
+
+/// How the star is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Polar,
+    Mollweide,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Kind::Polar => "maps",
+            Kind::Mollweide => "maps_mollweide",
+        }
+    }
+
+    /// Panels side by side, so that a page holds all nights of most campaigns.
+    fn columns(self, panels: usize) -> usize {
+        let most = match (self, panels) {
+            (Kind::Polar, ..=20) => 5,
+            (Kind::Polar, 21..=36) => 6,
+            (Kind::Polar, _) => 8,
+            (Kind::Mollweide, ..=18) => 3,
+            (Kind::Mollweide, 19..=32) => 4,
+            (Kind::Mollweide, _) => 5,
+        };
+        panels.min(most)
+    }
+
+    /// Radius of a map in a cell so wide, and height of the cell (pt).
+    fn measures(self, cell: f64) -> (f64, f64) {
+        match self {
+            Kind::Polar => {
+                let radius = 0.5 * cell - 16.0;
+                (radius, 2.0 * radius + 40.0)
+            }
+            Kind::Mollweide => {
+                let radius = 0.25 * (cell - 12.0);
+                (radius, 2.0 * radius + 30.0)
+            }
+        }
     }
 }
 
@@ -194,13 +332,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_strip_has_the_first_and_the_last_map_and_no_more_than_twelve() {
-        assert_eq!(evenly(3), [0, 1, 2]);
-        for n in [12, 13, 14, 40, 1000] {
-            let shown = evenly(n);
-            assert_eq!((shown.len(), shown[0], shown[11]), (12, 0, n - 1));
-            let steps: Vec<usize> = shown.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            assert!(steps.iter().max().unwrap() - steps.iter().min().unwrap() <= 1, "{n}: {shown:?}");
-        }
+    fn the_scale_goes_by_what_is_on_the_star() {
+        let mut values = vec![0.0; 5000];
+        values[..40].fill(-0.31);
+        assert_eq!(reach(values.iter()), 0.35);
+        // one pixel alone does not widen it
+        values[0] = 0.9;
+        assert_eq!(reach(values.iter()), 0.35);
+        assert_eq!(reach([0.0, 0.001].iter()), 0.05);
+        assert_eq!(reach([7.0].iter()), 1.0);
+        assert_eq!(reach([].iter()), 0.05);
     }
 }

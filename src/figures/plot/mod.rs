@@ -24,12 +24,15 @@ mod projection;
 mod star_map;
 mod surface;
 pub mod symbols;
+mod times;
 mod trace;
+mod turning;
 mod velocities;
 
 pub use density::Density;
 pub use projection::Projection;
 pub use trace::Sampled;
+pub use turning::turning;
 
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::journal::JournalError;
@@ -143,9 +146,9 @@ fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, Plot
         let problem = "maps: missing: an earlier version wrote this file; repeat `dimcmc map`".to_owned();
         return Err(OriginError::Content { path: folder.join(MAP), problem }.into());
     }
-    // maps of several times, with their errors, are a strip
+    // maps of several times, with their errors, are small and many
     let mut figures = match file.field {
-        Some(_) => vec![maps::figure(folder, &file)?],
+        Some(_) => maps::Nights::read(folder, &file)?.figures(),
         None => star_map::figures(folder, &file)?,
     };
     if folder.join(profiles::FILE).is_file() {

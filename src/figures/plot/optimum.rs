@@ -2,7 +2,8 @@
 
 use super::PlotError;
 use super::corner::Corner;
-use super::symbols::{Title, decimals, nearest_turn};
+use super::ephemeris::ephemeris;
+use super::symbols::{Shown, Title, nearest_turn};
 use super::trace::TRUTH;
 use crate::figures::drawing::colour::BLUE;
 use crate::figures::drawing::{Axis, Figure, Key, Legend, Paint, Panel, Rect, Scale, Stroke, panel::gaussian_contour};
@@ -36,15 +37,19 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         let problem = "no well-defined maximum, so there are no error bars to draw".into();
         return Err(PlotError::Content { path: folder.join(FILE), problem });
     }
+    let rotation_period_d = ephemeris(&file.provenance.config).map(|(period_d, _)| period_d);
+    let shown = |i: usize| Shown::of(&file.names[i], rotation_period_d, best[i] + 2.0 * sd[i]);
+    let shown: Vec<Shown> = (0..n).map(shown).collect();
+    let factor = |i: usize| shown[i].factor;
     let truth = |i: usize| {
         let truth = *file.truth.as_ref()?.get(&file.names[i])?;
         let periodic = Parameter::from_name(&file.names[i]).is_some_and(Parameter::is_phase);
-        Some(if periodic { nearest_turn(truth, best[i]) } else { truth })
+        Some(factor(i) * if periodic { nearest_turn(truth, best[i]) } else { truth })
     };
-    let title = |i: usize| Title::value(&file.names[i], best[i], [sd[i]; 2], decimals(sd[i]));
+    let title = |i: usize| Title::value(&shown[i], best[i], [sd[i]; 2], sd[i]);
     let corner = Corner {
-        names: &file.names,
-        ranges: (0..n).map(|i| [best[i] - 3.6 * sd[i], best[i] + 3.6 * sd[i]]).collect(),
+        shown: &shown,
+        ranges: (0..n).map(|i| [best[i] - 3.6 * sd[i], best[i] + 3.6 * sd[i]].map(|x| factor(i) * x)).collect(),
         // an ellipse is one on linear axes
         scales: vec![Scale::Linear; n],
         truth: (0..n).map(truth).collect(),
@@ -52,15 +57,16 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     };
     let diagonal = |figure: &mut Figure, frame: Rect, x: Axis, i: usize| {
         let panel = Panel { frame, y: Axis::linear("", [0.0, 1.12]), x };
-        let at = |u: f64| [best[i] + u * sd[i], (-0.5 * u * u).exp()];
+        let at = |u: f64| [factor(i) * (best[i] + u * sd[i]), (-0.5 * u * u).exp()];
         let bell: Vec<[f64; 2]> = (-72..=72).map(|k| at(f64::from(k) / 20.0)).collect();
         panel.area(figure, "bell", &bell, Paint::fill(super::corner::area_colours()[0]));
         panel.line(figure, "bell", &bell, Stroke::new(BLUE, 0.8));
     };
     let pair = |figure: &mut Figure, panel: &Panel, i: usize, j: usize| {
-        let c = &file.covariance;
+        let c = |i: usize, j: usize| factor(i) * factor(j) * file.covariance[i][j];
+        let centre = [factor(i) * best[i], factor(j) * best[j]];
         for (radius, colour) in RADII.into_iter().zip(super::corner::area_colours()) {
-            let ellipse = gaussian_contour([best[i], best[j]], [[c[i][i], c[i][j]], [c[j][i], c[j][j]]], radius);
+            let ellipse = gaussian_contour(centre, [[c(i, i), c(i, j)], [c(j, i), c(j, j)]], radius);
             let paint = Paint { fill: Some(colour), stroke: Some(Stroke::new(BLUE, 0.7)), sharp: false };
             panel.area(figure, "ellipse", &ellipse, paint);
         }
@@ -74,7 +80,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let mut figure = corner.draw("optimum", diagonal, pair, &legend);
     figure.caption =
         "The best parameters with the Gaussian of the curvature of the log-probability around them: ellipses of 68 \
-                      and 95 %, values with one standard deviation."
+        and 95 %, values with one standard deviation."
             .into();
     Ok(vec![figure])
 }

@@ -1,7 +1,7 @@
 //! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of
 //! observation alone do, and how well K is known.
 
-use super::symbols::{PERIOD_DIGITS, decimals};
+use super::symbols::{PERIOD_DIGITS, Speeds, decimals};
 use super::{POSITIVE, PlotError, velocities};
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
@@ -86,9 +86,14 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
     let window = Panel { frame: frames[1], x: x.clone(), y: Axis::linear("window", [0.0, 1.05]) };
     window.smooth_line(&mut figure, "window", &curve("window")?, Stroke::new(BLACK, 0.9));
 
-    let (sigma, upper, fitted) = (curve("sigma_k_kms")?, curve("k_upper95_kms")?, curve("k_kms")?);
+    let unit = Speeds::of(table.column("k_upper95_kms")?);
+    let speeds = |column: &str| -> Result<Vec<[f64; 2]>, PlotError> {
+        Ok(curve(column)?.into_iter().map(|[period, kms]| [period, unit.factor * kms]).collect())
+    };
+    let (sigma, upper, fitted) = (speeds("sigma_k_kms")?, speeds("k_upper95_kms")?, speeds("k_kms")?);
     let all = sigma.iter().chain(&upper).map(|p| p[1]);
-    let amplitude = Panel { frame: frames[2], x, y: Axis::log("*K* (km/s)", range_of(all, Scale::Log, 0.08)) };
+    let label = format!("*K* ({})", unit.name);
+    let amplitude = Panel { frame: frames[2], x, y: Axis::log(&label, range_of(all, Scale::Log, 0.08)) };
     let [sigma_pen, upper_pen] = [Stroke::new(BLUE, 1.0), Stroke::new(BLACK, 0.9).dashed()];
     let fitted_pen = Stroke::new(GREEN, 0.8).dotted();
     amplitude.smooth_line(&mut figure, "k", &fitted, fitted_pen);
@@ -206,10 +211,6 @@ fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitRecord) {
     figure.text(&text, [left, y - 3.5], Font::SMALL.coloured(BLUE), Align::Left, 0.0);
 }
 
-const CAPTION: &str = "Periodogram. Above: gain in ln L by an orbit of each period, spots marginalised out; dashed: \
-what chance \
-                       exceeds in so many searches of stars without a planet. Middle: window function of the times. \
-                       Below: best \
-                       K, its standard error and its upper limit. Dotted lines: the rotation period and its \
-                       fractions, and one \
-                       day.";
+const CAPTION: &str = "Periodogram. Top: gain in ln L by a circular orbit of each period, spots marginalised out; \
+dashed: thresholds at which planet-free simulations reach the given FAP. Middle: window function of the times. Bottom: \
+best K, its uncertainty and its 95 % upper limit. Dotted lines: the rotation period and its fractions, and one day.";

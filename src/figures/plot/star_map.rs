@@ -213,39 +213,46 @@ fn polar(figure: &mut Figure, star: &Star, centre: Point, cycles: &[f64], scale:
         let at = toward(phase, RADIUS + 9.5);
         figure.text(text, [at[0], at[1] + down], Font::SMALL, align, 0.0);
     }
-    for latitude in [60.0, 30.0, 0.0, -30.0] {
-        let [x, y] = projection.place(207.0, latitude);
-        let text = degrees(latitude);
-        let width = width_pt(&text, TINY.size);
-        let ground = Rect { left: x - 0.5 * width - 1.0, top: y - 3.2, width: width + 2.0, height: 6.4 };
-        figure.rect("label-ground", ground, Paint::fill(WHITE.opacity(0.75)));
-        figure.text(&text, [x, y + 2.1], TINY, Align::Centre, 0.0);
-    }
+    parallels(figure, projection, &[60.0, 30.0, 0.0, -30.0], TINY);
     if !cycles.is_empty() {
         let [x, y] = [centre[0] - RADIUS + 2.0, centre[1] + RADIUS + 2.0];
         figure.path("phase-key", open(&[[x, y - 11.0], [x, y - 5.5]]), Paint::stroke(Stroke::new(BLACK, 0.6)));
         figure.text("observed phases", [x, y + 2.0], TINY, Align::Centre, 0.0);
     }
-    rotation_arrow(figure, [centre[0] + RADIUS + 2.0, centre[1] + RADIUS - 6.0]);
+    rotation_arrow(figure, [centre[0] + RADIUS + 2.0, centre[1] + RADIUS - 6.0], 7.0, "rotation");
+}
+
+/// Labels of parallels in polar projection.
+pub(super) fn parallels(figure: &mut Figure, projection: Projection, latitudes: &[f64], font: Font) {
+    for latitude in latitudes {
+        let [x, y] = projection.place(207.0, *latitude);
+        let text = degrees(*latitude);
+        let (width, half) = (width_pt(&text, font.size), 0.53 * font.size);
+        let ground = Rect { left: x - 0.5 * width - 1.0, top: y - half, width: width + 2.0, height: 2.0 * half };
+        figure.rect("label-ground", ground, Paint::fill(WHITE.opacity(0.75)));
+        figure.text(&text, [x, y + 0.35 * font.size], font, Align::Centre, 0.0);
+    }
 }
 
 /// A latitude with its sign.
-fn degrees(latitude: f64) -> String {
+pub(super) fn degrees(latitude: f64) -> String {
     if latitude == 0.0 { "0°".to_owned() } else { format!("{latitude:+}°") }
 }
 
-/// An arrow on an arc with the way the star turns: anticlockwise.
-fn rotation_arrow(figure: &mut Figure, at: Point) {
-    let radius = 7.0;
+/// An arrow on an arc with the way the star turns, anticlockwise, and a text below it.
+pub(super) fn rotation_arrow(figure: &mut Figure, at: Point, radius: f64, text: &str) {
     let on = |degrees: f64, radius: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         [at[0] + radius * cos, at[1] - radius * sin]
     };
+    let (pen, head) = (0.07 * radius + 0.4, 0.28 * radius + 1.0);
     let arc: Vec<Point> = (0..=30).map(|k| on(-60.0 + 8.6 * f64::from(k), radius)).collect();
-    figure.polyline("rotation", &arc, Stroke::new(BLACK, 0.9));
-    let head = [on(232.0, radius), on(190.0, radius - 3.0), on(190.0, radius + 3.0)];
+    figure.polyline("rotation", &arc, Stroke::new(BLACK, pen));
+    let head = [on(232.0, radius), on(190.0, radius - head), on(190.0, radius + head)];
     figure.polygon("rotation", &head, Paint::fill(BLACK));
-    figure.text("rotation", [at[0], at[1] + radius + 8.0], TINY, Align::Centre, 0.0);
+    if !text.is_empty() {
+        figure.text(text, [at[0], at[1] + radius + 1.0 + TINY.size], TINY, Align::Centre, 0.0);
+    }
 }
 
 fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, scale: Scale) {

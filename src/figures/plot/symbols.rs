@@ -1,5 +1,6 @@
 //! The symbols of astronomers for parameters.
 
+use crate::figures::drawing::Axis;
 use crate::model::Parameter;
 
 /// Decimals of a period in days, in figures and tables alike.
@@ -10,6 +11,13 @@ const PHASE_UNIT: &str = "cycles to max. RV";
 
 /// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
 pub fn symbol(name: &str) -> (&str, &'static str) {
+    // spots have no symbols that everyone knows
+    match name {
+        "spot_amplitude" => return ("spot amplitude", ""),
+        "spot_slope" => return ("power-law index of spots", ""),
+        "spot_lifetime_d" => return ("spot lifetime", "d"),
+        _ => {}
+    }
     if let Some(parameter) = Parameter::from_name(name) {
         return (parameter.spec().symbol, unit(parameter));
     }
@@ -35,6 +43,34 @@ fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
+/// What velocities (km/s) are drawn in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Speeds {
+    /// What a velocity in km/s is multiplied by.
+    pub factor: f64,
+    /// The unit.
+    pub name: &'static str,
+}
+
+impl Speeds {
+    /// Velocities up to this are drawn in m/s.
+    const SMALL_KMS: f64 = 1.5;
+
+    /// Those of a star.
+    pub const KMS: Speeds = Speeds { factor: 1.0, name: "km/s" };
+
+    /// m/s for small ones.
+    pub fn of(kms: &[f64]) -> Self {
+        let largest = kms.iter().filter(|x| x.is_finite()).fold(0.0, |largest: f64, x| largest.max(x.abs()));
+        if largest < Self::SMALL_KMS { Speeds { factor: 1e3, name: "m/s" } } else { Speeds::KMS }
+    }
+
+    /// An axis of them.
+    pub fn axis(self, label: &str, range_kms: [f64; 2]) -> Axis {
+        Axis::linear(&format!("{label} ({})", self.name), range_kms.map(|kms| self.factor * kms))
+    }
+}
+
 /// Label of an axis: symbol and unit.
 pub fn label(name: &str) -> String {
     if let Some(injected) = name.strip_prefix("true_") {
@@ -46,9 +82,40 @@ pub fn label(name: &str) -> String {
     }
 }
 
-/// Short label of an axis, for narrow panels.
-pub fn short_label(name: &str) -> String {
-    label(name).replace(PHASE_UNIT, "cycles")
+/// A parameter as figures show it: periods in days, small velocities in m/s.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shown {
+    symbol: String,
+    unit: &'static str,
+    /// What its values are multiplied by.
+    pub factor: f64,
+}
+
+impl Shown {
+    /// The parameter of a name whose values reach up to `largest`, of a star with a rotation period (d).
+    pub fn of(name: &str, rotation_period_d: Option<f64>, largest: f64) -> Self {
+        let (symbol, unit) = symbol(name);
+        let shown = |symbol: &str, unit, factor| Shown { symbol: symbol.to_owned(), unit, factor };
+        match (name, rotation_period_d) {
+            ("porb_over_prot", Some(days)) => shown("*P*_{orb}", "d", days),
+            ("porb2_over_prot", Some(days)) => shown("*P*_{orb,2}", "d", days),
+            ("k_kms" | "k2_kms", _) => {
+                let speeds = Speeds::of(&[largest]);
+                shown(symbol, speeds.name, speeds.factor)
+            }
+            _ => shown(symbol, unit, 1.0),
+        }
+    }
+
+    /// Label of an axis: symbol and unit.
+    pub fn label(&self) -> String {
+        if self.unit.is_empty() { self.symbol.clone() } else { format!("{} ({})", self.symbol, self.unit) }
+    }
+
+    /// The same for narrow panels.
+    pub fn short_label(&self) -> String {
+        self.label().replace(PHASE_UNIT, "cycles").replace(" of spots", "")
+    }
 }
 
 /// What is said of a parameter above a panel.
@@ -65,28 +132,27 @@ impl Title {
     /// Lines that a title has at most.
     pub const LINES: usize = 3;
 
-    /// A value with its error bars, downwards and upwards.
-    pub fn value(name: &str, value: f64, [down, up]: [f64; 2], digits: usize) -> Self {
-        let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
-        let (symbol, unit) = symbol(name);
-        let unit = match unit {
+    /// A value with its error bars, downwards and upwards, of which `sigma` has two digits; none of them multiplied yet.
+    pub(super) fn value(shown: &Shown, value: f64, [down, up]: [f64; 2], sigma: f64) -> Self {
+        let digits = decimals(shown.factor * sigma);
+        let [value, down, up] = [value, down, up].map(|x| format!("{:.digits$}", shown.factor * x));
+        let unit = match shown.unit {
             // those of a phase go without saying
             "" | PHASE_UNIT => String::new(),
             "°" => "°".to_owned(),
             unit => format!(" {unit}"),
         };
         Title {
-            symbol: symbol.to_owned(),
-            value: Some(format!("{value:.digits$}")),
+            symbol: shown.symbol.clone(),
+            value: Some(value),
             errors: if down == up { format!("± {up}") } else { format!("+{up} -{down}") },
             unit,
         }
     }
 
     /// Of a parameter that the data do not constrain, so that no value means anything.
-    pub fn unconstrained(name: &str) -> Self {
-        let symbol = symbol(name).0.to_owned();
-        Title { symbol, value: None, errors: String::new(), unit: String::new() }
+    pub(super) fn unconstrained(shown: &Shown) -> Self {
+        Title { symbol: shown.symbol.clone(), value: None, errors: String::new(), unit: String::new() }
     }
 
     /// In so many lines, [`Title::LINES`] at most.

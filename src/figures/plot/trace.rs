@@ -1,7 +1,8 @@
 //! A chain: what was sampled as figures need it, its walkers over the steps, and how long it remembers.
 
 use super::PlotError;
-use super::symbols::{nearest_turn, short_label, symbol};
+use super::ephemeris::ephemeris;
+use super::symbols::{Shown, nearest_turn, symbol};
 use crate::data::io::journal;
 use crate::figures::drawing::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figures::drawing::panel::Sides;
@@ -50,6 +51,13 @@ impl Sampled {
         let (summary, _) = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
         let truth = manifest.truth(&settings, &summary);
         Ok(Sampled { manifest, chain, priors, kinds, goals, summary, truth })
+    }
+
+    /// How figures show parameter `i`.
+    pub(super) fn shown(&self, i: usize) -> Shown {
+        let name = &self.summary.names[i];
+        let rotation_period_d = ephemeris(&self.manifest.origin.config).map(|(period_d, _)| period_d);
+        Shown::of(name, rotation_period_d, self.summary.parameters[name].ci95[1])
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
@@ -126,13 +134,16 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
     let steps = sampled.chain.steps();
     let stride = steps.div_ceil(STEPS).max(1);
     let shape = sampled.chain.shape();
-    for (i, name) in names.iter().enumerate() {
+    for i in 0..names.len() {
         let frame = Rect { left, top: top + i as f64 * (height + gap), width: figure.width - left - 8.0, height };
-        let series = sampled.series(i, 0);
-        let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
-        let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
+        let shown = sampled.shown(i);
+        let mut series = sampled.series(i, 0);
+        series.iter_mut().flatten().flatten().for_each(|x| *x *= shown.factor);
+        let truth = |value: Option<f64>| value.map(|x| shown.factor * x);
+        let drawn = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
+        let values: Vec<f64> = drawn.flatten().copied().chain(truth(sampled.near_truth(i))).collect();
         let scale = sampled.scale(i);
-        let y = Axis { label: short_label(name), range: range_of(values.into_iter(), scale, 0.05), scale };
+        let y = Axis { label: shown.short_label(), range: range_of(values.into_iter(), scale, 0.05), scale };
         let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
         let kept = sampled.summary.discarded_steps as f64;
         let [low, high] = panel.y.range;
@@ -146,7 +157,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
                 panel.line(&mut figure, "walker", &points, pen);
             }
         }
-        if let Some(truth) = sampled.truth(i) {
+        if let Some(truth) = truth(sampled.truth(i)) {
             panel.horizontal(&mut figure, "truth", truth, INJECTED);
         }
         panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });

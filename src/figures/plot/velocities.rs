@@ -2,13 +2,15 @@
 //! folded with the orbit.
 
 use super::ephemeris::ephemeris;
-use super::symbols::decimals;
+use super::symbols::{Speeds, decimals};
+use super::times::{Clock, Stretch, stretches};
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
-use crate::figures::drawing::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
+use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
+use crate::planets::verdict::speed;
 use crate::runs::blind_search::{OrbitRecord, PeriodogramFile};
 use crate::runs::origin;
 use crate::star::{Eccentric, Motion, Orbit};
@@ -20,7 +22,7 @@ pub(super) const FILE: &str = "rv.csv";
 /// The covariance of those of `periodogram`, a row a profile.
 const COVARIANCE: &str = "covariance.csv";
 
-/// A velocity with its error bar, or without where that is 0.
+/// Velocities (km/s) with their error bars, or without where these are missing.
 struct Series<'a> {
     class: &'static str,
     label: &'a str,
@@ -29,10 +31,16 @@ struct Series<'a> {
     marker: (Marker, f64, crate::figures::drawing::Colour),
 }
 
-/// Velocities over time in panels above each other, and one of them folded with an orbit.
+/// Velocities over time in panels above each other, and those without spots folded with an orbit.
 struct Curves<'a> {
+    time_d: &'a [f64],
     cycle: &'a [f64],
-    panels: Vec<(&'a str, Vec<Series<'a>>)>,
+    /// First moments, with the spots in them.
+    moments: Vec<Series<'a>>,
+    /// Without spots.
+    clean: Series<'a>,
+    /// Without the orbit, too.
+    residual: Series<'a>,
     motion: Motion,
     vsys_kms: f64,
     /// Rotation period of the star (d).
@@ -41,8 +49,6 @@ struct Curves<'a> {
     sigma: [Option<f64>; 2],
     /// What the orbit is called.
     orbit_is: &'static str,
-    /// The panel of velocities without spots, where the orbit is drawn and which is folded.
-    orbital: usize,
 }
 
 /// The velocities of maps: marginalised over maps, or with the model's spots taken out.
@@ -68,34 +74,31 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let modelled = column("modelled_kms")?;
     let model = Series { class: "model", label: "model", y: modelled, sigma: Vec::new(), marker: MODEL };
     let curves = Curves {
+        time_d: table.column_within("time_d", ANY)?,
         cycle: table.column_within("cycle", ANY)?,
-        panels: vec![
-            ("RV (km/s)", vec![series(column("observed_kms")?, sigma, "first moment"), model]),
-            ("RV − spots (km/s)", vec![series(clean, errors.clone(), "")]),
-            ("residual (km/s)", vec![series(residual, errors, "")]),
-        ],
+        moments: vec![series(column("observed_kms")?, sigma, "first moment"), model],
+        clean: series(clean, errors.clone(), ""),
+        residual: series(residual, errors, ""),
         motion: state.motion,
         vsys_kms: state.vsys_kms,
         rotation_period_d: ephemeris(&fit.provenance.config).map_or(f64::NAN, |(period_d, _)| period_d),
         sigma: [None; 2],
         orbit_is: "assumed orbit",
-        orbital: 1,
     };
     let mut figure = curves.draw();
-    figure.caption = match fit.field.is_some() {
-        true => {
-            "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with all maps \
-            integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out. To \
-            the right, if an orbit is assumed: the middle folded with the orbital period; phase 0 is the largest \
-            velocity."
-        }
-        false => {
-            "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: the model's \
-            spots taken out, with the assumed orbit. Below: the model taken out. To the right: the middle folded with \
-            the orbital period; phase 0 is the largest velocity."
-        }
-    }
-    .into();
+    let spots = match fit.field.is_some() {
+        true => "spots marginalised out; their uncertainties are correlated",
+        false => "spots of the model taken out",
+    };
+    let folded = match curves.folds() {
+        true => " Bottom: residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity",
+        false => "",
+    };
+    figure.caption = format!(
+        "Radial velocities. Top: first moments of the observed profiles and of the model. Below: {spots}{}.{folded}{}",
+        if curves.folds() { ", and the assumed orbit" } else { "" },
+        if curves.folds() { "." } else { "" },
+    );
     Ok(figure)
 }
 
@@ -126,25 +129,23 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
     let orbit: Vec<f64> = cycle.iter().map(|cycle| offset_kms + motion.velocity_kms(*cycle)).collect();
     let residual = clean.less(&orbit);
     let curves = Curves {
+        time_d: table.column_within("time_d", ANY)?,
         cycle,
-        panels: vec![
-            ("RV (km/s)", vec![series("observed", "", "first_moment_kms", "first_moment_sigma_kms", POINT)?]),
-            ("RV − spots (km/s)", vec![clean]),
-            ("residual (km/s)", vec![residual]),
-        ],
+        moments: vec![series("observed", "", "first_moment_kms", "first_moment_sigma_kms", POINT)?],
+        clean,
+        residual,
         motion,
         vsys_kms: offset_kms,
         rotation_period_d: period_d / porb_over_prot,
         sigma: [Some(sigma_k_kms), sigma_porb_over_prot],
         orbit_is: "best orbit",
-        orbital: 1,
     };
     let mut figure = curves.draw();
     figure.caption =
-        "Radial velocities. Above: first moments of the profiles. Middle: with the spots marginalised out, and the \
-        best orbit; their errors are correlated, bars are the diagonal of the covariance (covariance.csv), without the \
-        error of systemic velocity and RV offsets, which shifts all profiles of a data set alike. Below: the best \
-        orbit taken out. To the right: the middle folded with the orbital period; phase 0 is the largest velocity."
+        "Radial velocities. Top: first moments of the profiles. Middle: spots marginalised out, and the best orbit; \
+        uncertainties are correlated, bars are the diagonal of the covariance (covariance.csv), without the \
+        uncertainty of systemic velocity and RV offsets, which shifts all profiles of a data set alike. Bottom: \
+        residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity."
             .into();
     Ok(figure)
 }
@@ -153,78 +154,135 @@ const POINT: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Disc, 3.2
 const MODEL: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Diamond, 2.6, VERMILION);
 const ORBIT: Stroke = Stroke::new(BLUE, 1.0);
 
+/// Panels on the left: heights of first moments, velocities without spots, and residuals, as shares.
+const ROWS: [f64; 3] = [1.0, 1.3, 0.8];
+
 impl Curves<'_> {
-    fn draw(&self) -> Figure {
+    /// Whether there is an orbit to fold with.
+    fn folds(&self) -> bool {
         let Orbit { k_kms, porb_over_prot, .. } = self.motion.first.orbit;
-        let folds = k_kms > 0.0 && porb_over_prot > 0.0;
-        let rows = self.panels.len() as f64;
-        let mut figure = Figure::new("rv", if folds { PAGE_MM } else { COLUMN_MM }, 24.0 + 26.0 * rows);
-        let mut legend = legend(&self.panels[0].1);
-        legend.add(Key::Line(ORBIT), self.orbit_is);
-        let (left, top, gap) = (38.0, 16.0, 8.0);
-        let width = if folds { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
-        let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
-        let span = range_of(self.cycle.iter().copied(), crate::figures::drawing::Scale::Linear, 0.03);
-        for (k, (label, series)) in self.panels.iter().enumerate() {
-            let frame = Rect { left, top: top + k as f64 * (height + gap), width, height };
-            let middle = if k > self.orbital { 0.0 } else { self.vsys_kms };
-            let y = Axis::linear(label, range(series, middle));
-            let panel = Panel { frame, x: Axis::linear("rotation cycle", span), y };
-            match k {
-                k if k == self.orbital => {
-                    let steps = 600;
-                    let curve: Vec<[f64; 2]> = (0..=steps)
-                        .map(|i| span[0] + (span[1] - span[0]) * f64::from(i) / f64::from(steps))
-                        .map(|cycle| [cycle, self.vsys_kms + self.motion.velocity_kms(cycle)])
-                        .collect();
-                    panel.line(&mut figure, "orbit", &curve, ORBIT);
-                }
-                k if k > self.orbital => panel.horizontal(&mut figure, "zero", 0.0, Stroke::new(GREY, 0.6).dashed()),
-                _ => {}
+        k_kms > 0.0 && porb_over_prot > 0.0
+    }
+
+    fn draw(&self) -> Figure {
+        let rows = if self.folds() { &ROWS[..] } else { &ROWS[..2] };
+        let mut figure = Figure::new("rv", PAGE_MM, 30.0 + 26.0 * rows.len() as f64);
+        let (left, top, gap) = (38.0, 46.0, 7.0);
+        let width = if self.folds() { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
+        let room = figure.height - top - 28.0 - gap * (rows.len() as f64 - 1.0);
+        let total: f64 = rows.iter().sum();
+        let clock = Clock::of(self.time_d.iter().copied());
+        let parts = stretches(self.time_d.iter().copied(), left, width);
+        let unit = Speeds::of(&[&self.clean.y[..], &self.residual.y].concat());
+        let moments: Vec<&Series> = self.moments.iter().collect();
+        let mut at = top;
+        let mut frames = Vec::new();
+        for (k, share) in rows.iter().enumerate() {
+            let whole = Rect { left, top: at, width, height: room * share / total };
+            let (series, label, unit) = match k {
+                0 => (moments.clone(), "RV", Speeds::KMS),
+                1 => (vec![&self.clean], "RV − spots", unit),
+                _ => (vec![&self.residual], "residual", unit),
+            };
+            let y = unit.axis(label, range(&series, if k > 1 { 0.0 } else { self.vsys_kms }));
+            for (n, part) in parts.iter().enumerate() {
+                let frame = Rect { left: part.left, width: part.width, ..whole };
+                let panel = Panel { frame, x: part.axis(&clock), y: y.clone() };
+                self.draw_part(&mut figure, (&panel, part, &clock), k, (&series, unit));
+                let sides = Sides { below: k + 1 == rows.len(), left: n == 0 };
+                panel.two_axes_frame(&mut figure, sides, &self.cycles(part), k == 0);
             }
-            series.iter().for_each(|one| one.draw(&mut figure, &panel, self.cycle));
-            let below = k + 1 == self.panels.len();
-            panel.frame(&mut figure, Sides { below, left: true });
+            frames.push(whole);
+            at += whole.height + gap;
         }
         let middle = left + 0.5 * width;
-        legend.row(&mut figure, [middle, 8.0]);
-        if folds {
-            let frame = Rect {
-                left: left + width + 48.0,
-                top,
-                width: figure.width - left - width - 56.0,
-                height: figure.height - top - 28.0,
-            };
-            self.fold(&mut figure, frame);
+        let below = frames[frames.len() - 1].bottom();
+        figure.text("rotation cycle", [middle, top - 13.0], Font::LABEL, Align::Centre, 0.0);
+        figure.text(&clock.label, [middle, below + 19.0], Font::LABEL, Align::Centre, 0.0);
+        let mut legend = legend(&self.moments);
+        if self.folds() {
+            legend.add(Key::Line(ORBIT), self.orbit_is);
+            let beside =
+                |frame: Rect| Rect { left: left + width + 44.0, width: figure.width - left - width - 52.0, ..frame };
+            let above = beside(Rect { top: frames[0].top, height: frames[1].bottom() - frames[0].top, ..frames[0] });
+            let below = beside(frames[2]);
+            self.fold(&mut figure, [above, below], unit);
         }
+        legend.row(&mut figure, [middle, 9.0]);
         figure
     }
 
-    fn fold(&self, figure: &mut Figure, frame: Rect) {
-        let (label, series) = &self.panels[self.orbital];
-        let y = Axis::linear(label, range(series, self.vsys_kms));
-        let panel = Panel { frame, x: Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]), y };
+    /// The velocities of row `k` in one stretch of time.
+    fn draw_part(
+        &self,
+        figure: &mut Figure,
+        (panel, part, clock): (&Panel, &Stretch, &Clock),
+        k: usize,
+        (series, unit): (&[&Series], Speeds),
+    ) {
+        match k {
+            1 if self.folds() => {
+                let steps = 600;
+                let [first, last] = part.range_d;
+                let time = |i: i32| first + (last - first) * f64::from(i) / f64::from(steps);
+                let rv = |time: f64| self.vsys_kms + self.motion.velocity_kms(self.cycle_at(time));
+                let curve: Vec<[f64; 2]> =
+                    (0..=steps).map(time).map(|time| [time - clock.zero_d, unit.factor * rv(time)]).collect();
+                panel.line(figure, "orbit", &curve, ORBIT);
+            }
+            1 => panel.horizontal(figure, "zero", unit.factor * self.vsys_kms, Stroke::new(GREY, 0.6).dashed()),
+            k if k > 1 => panel.horizontal(figure, "zero", 0.0, Stroke::new(GREY, 0.6).dashed()),
+            _ => {}
+        }
+        let inside: Vec<usize> = (0..self.time_d.len()).filter(|k| part.holds(self.time_d[*k])).collect();
+        let times: Vec<f64> = inside.iter().map(|k| self.time_d[*k] - clock.zero_d).collect();
+        series.iter().for_each(|one| one.only(&inside).draw(figure, panel, &times, unit));
+    }
+
+    /// Rotation cycle at a time (d).
+    fn cycle_at(&self, time_d: f64) -> f64 {
+        let (first_d, first) = (self.time_d.first().copied(), self.cycle.first().copied());
+        first.unwrap_or(0.0) + (time_d - first_d.unwrap_or(0.0)) / self.rotation_period_d
+    }
+
+    /// The axis of rotation cycles over a stretch of time.
+    fn cycles(&self, part: &Stretch) -> Axis {
+        Axis::linear("", part.range_d.map(|time| self.cycle_at(time)))
+    }
+
+    /// Velocities without spots, and what the orbit leaves of them, over the orbital phase.
+    fn fold(&self, figure: &mut Figure, [above, below]: [Rect; 2], unit: Speeds) {
         let Motion { first, second } = self.motion;
         let Orbit { k_kms, porb_over_prot, phi } = first.orbit;
         let phase = |cycle: &f64| (cycle / porb_over_prot - phi).rem_euclid(1.0);
-        // counted from the largest velocity
-        let alone = Eccentric { orbit: Orbit { porb_over_prot: 1.0, phi: 0.0, ..first.orbit }, ..first };
-        let curve: Vec<[f64; 2]> =
-            (0..=200).map(|i| f64::from(i) / 200.0).map(|t| [t, self.vsys_kms + alone.velocity_kms(t)]).collect();
-        panel.line(figure, "orbit", &curve, ORBIT);
         let phases: Vec<f64> = self.cycle.iter().map(phase).collect();
         let others = |cycle: &f64| second.map_or(0.0, |second| second.velocity_kms(*cycle));
         let others: Vec<f64> = self.cycle.iter().map(others).collect();
-        series.iter().for_each(|one| one.less(&others).draw(figure, &panel, &phases));
-        panel.frame(figure, Sides::BOTH);
-        let mut legend = Legend::default();
-        let period_d = porb_over_prot * self.rotation_period_d;
+        let x = Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]);
+        let alone = self.clean.less(&others);
+        let panel = Panel { frame: above, x: x.clone(), y: unit.axis("RV − spots", range(&[&alone], self.vsys_kms)) };
+        // counted from the largest velocity
+        let orbit = Eccentric { orbit: Orbit { porb_over_prot: 1.0, phi: 0.0, ..first.orbit }, ..first };
+        let rv = |phase: f64| unit.factor * (self.vsys_kms + orbit.velocity_kms(phase));
+        let curve: Vec<[f64; 2]> = (0..=200).map(|i| f64::from(i) / 200.0).map(|t| [t, rv(t)]).collect();
+        panel.line(figure, "orbit", &curve, ORBIT);
+        alone.draw(figure, &panel, &phases, unit);
+        panel.frame(figure, Sides { below: false, left: true });
+        let residuals = Panel { frame: below, x, y: unit.axis("residual", range(&[&self.residual], 0.0)) };
+        residuals.horizontal(figure, "zero", 0.0, Stroke::new(GREY, 0.6).dashed());
+        self.residual.draw(figure, &residuals, &phases, unit);
+        residuals.frame(figure, Sides::BOTH);
         let digits = |sigma: Option<f64>| decimals(sigma.unwrap_or(f64::NAN));
-        let [k, ratio] = self.sigma.map(digits);
+        let [k, ratio] = [speed(k_kms, self.sigma[0].unwrap_or(0.01 * k_kms)), {
+            let digits = digits(self.sigma[1]);
+            format!("{porb_over_prot:.digits$}")
+        }];
         let days = digits(self.sigma[1].map(|sigma| sigma * self.rotation_period_d));
-        let text = format!("*K* = {k_kms:.k$} km/s, *P* = {period_d:.days$} d = {porb_over_prot:.ratio$} *P*_{{rot}}");
+        let period_d = porb_over_prot * self.rotation_period_d;
+        let text = format!("*K* = {k}, *P* = {period_d:.days$} d = {ratio} *P*_{{rot}}");
+        let mut legend = Legend::default();
         legend.add(Key::Line(ORBIT), &text);
-        legend.draw(figure, frame, [0.5, 0.0]);
+        legend.row(figure, [above.centre()[0], above.top - 8.0]);
     }
 }
 
@@ -233,7 +291,7 @@ const MARGIN: f64 = 0.25;
 
 /// All error bars, with as much above `middle` as below it, so that a panel shows what is not centred there; above and
 /// below their own mean where they are all to one side of it.
-fn range(series: &[Series], middle: f64) -> [f64; 2] {
+fn range(series: &[&Series], middle: f64) -> [f64; 2] {
     let ends = series.iter().flat_map(|one| {
         let sigma = |k: usize| one.sigma.get(k).copied().unwrap_or(0.0);
         one.y.iter().enumerate().flat_map(move |(k, y)| [y - sigma(k), y + sigma(k)])
@@ -258,11 +316,19 @@ impl<'a> Series<'a> {
         Series { y, sigma: self.sigma.clone(), ..*self }
     }
 
-    fn draw(&self, figure: &mut Figure, panel: &Panel, x: &[f64]) {
-        for ((x, y), sigma) in x.iter().zip(&self.y).zip(&self.sigma) {
+    /// Some of them.
+    fn only(&self, these: &[usize]) -> Series<'a> {
+        let of = |all: &[f64]| these.iter().filter_map(|k| all.get(*k).copied()).collect();
+        Series { y: of(&self.y), sigma: of(&self.sigma), ..*self }
+    }
+
+    fn draw(&self, figure: &mut Figure, panel: &Panel, x: &[f64], unit: Speeds) {
+        let y: Vec<f64> = self.y.iter().map(|y| unit.factor * y).collect();
+        for ((x, y), sigma) in x.iter().zip(&y).zip(&self.sigma) {
+            let sigma = unit.factor * sigma;
             panel.bar(figure, "error-bar", [[*x, y - sigma], [*x, y + sigma]], 0.0, Stroke::new(GREY, 0.6));
         }
-        let points: Vec<[f64; 2]> = x.iter().zip(&self.y).map(|(x, y)| [*x, *y]).collect();
+        let points: Vec<[f64; 2]> = x.iter().zip(&y).map(|(x, y)| [*x, *y]).collect();
         panel.points(figure, self.class, &points, self.marker);
     }
 }

@@ -55,6 +55,8 @@ pub struct Chapter {
     pub notes: Vec<String>,
     /// Tables, each with a line above it.
     pub tables: Vec<(String, Table)>,
+    /// Tables that say how well a sampler did, which are folded away.
+    pub diagnostics: Vec<(String, Table)>,
 }
 
 impl Chapter {

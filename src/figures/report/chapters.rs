@@ -101,6 +101,7 @@ fn search(file: &PeriodogramFile) -> Chapter {
             ("The best orbit.".into(), table(&["parameter", "best", "error", "injected"], orbit)),
             ("Peaks of the periodogram.".into(), table(&head, file.peaks.iter().map(peak).collect())),
         ],
+        diagnostics: Vec::new(),
     }
 }
 
@@ -196,6 +197,7 @@ fn best(file: &OptimumFile) -> Chapter {
             "The best parameters, with errors from the curvature.".into(),
             table(&["parameter", "best", "error", "injected"], rows),
         )],
+        ..Chapter::default()
     }
 }
 

@@ -1,7 +1,8 @@
 //! The page as HTML.
 
-use super::chapter::{Chapter, Table, Tone};
+use super::chapter::{Table, Tone};
 use super::citation;
+use super::section::{Folded, Kind, Section};
 use crate::figures::drawing::{COLUMN_MM, Figure, plain};
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -16,19 +17,35 @@ const NARROW_PT: f64 = 1.3 * COLUMN_MM * 72.0 / 25.4;
 
 /// The page.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Page {
-    /// Name of the folder.
+pub(super) struct Page {
+    /// Name of the star.
     pub title: String,
+    pub subtitle: String,
     /// Star and data, label and text a line.
     pub subject: Vec<(String, String)>,
-    /// What the folder holds, kind by kind.
-    pub chapters: Vec<Chapter>,
-    /// All figures.
-    pub figures: Vec<Figure>,
+    /// The maps that the script turns.
+    pub turning: Option<Value>,
+    /// What the results come to.
+    pub statements: Vec<Statement>,
+    /// What speaks against it, or must be known beside it.
+    pub warnings: Vec<String>,
+    pub sections: Vec<Section>,
+    /// What was assumed: tables, each with a line above it.
+    pub assumed: Vec<(String, Table)>,
+    /// What was measured on the observations before.
+    pub measured: Vec<String>,
     /// The config with all defaults filled in, where a file has it.
     pub config: Option<Value>,
     /// Version of the program and fingerprint of the data, where a file has them.
     pub provenance: Vec<(String, String)>,
+}
+
+/// What a result comes to, in a sentence.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Statement {
+    pub kind: Kind,
+    pub tone: Tone,
+    pub sentence: String,
 }
 
 /// The whole page.
@@ -37,8 +54,8 @@ pub(super) fn page(page: &Page) -> String {
     let mut html = format!(
         "{BEGINNING}<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{title}: dimcmc \
-         report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{}</p>\n",
-        escape(&subtitle(page))
+         report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<div>\n<h1>{title}</h1>\n<p>{}</p>\n",
+        escape(&page.subtitle)
     );
     if !page.subject.is_empty() {
         html += "<dl class=\"subject\">";
@@ -47,58 +64,109 @@ pub(super) fn page(page: &Page) -> String {
         }
         html += "</dl>\n";
     }
+    let is_assumed = page.assumed.iter().any(|(_, table)| !table.rows.is_empty());
     html += "<nav>";
-    for (k, chapter) in page.chapters.iter().enumerate() {
-        let _ = write!(html, "<a href=\"#chapter{k}\">{}</a> ", escape(&chapter.heading));
+    for section in &page.sections {
+        let (id, heading) = section.kind.names();
+        let _ = write!(html, "<a href=\"#{id}\">{heading}</a> ");
     }
-    html += "<a href=\"#figures\">Figures</a> ";
-    if page.config.is_some() {
-        html += "<a href=\"#config\">Config</a> ";
+    if is_assumed {
+        html += "<a href=\"#assumed\">Assumptions</a> ";
     }
-    html += "<a href=\"#cite\">How to cite</a></nav>\n</header>\n<main>\n";
-    for (k, one) in page.chapters.iter().enumerate() {
-        chapter(&mut html, k, one);
+    html += "<a href=\"#cite\">How to cite</a></nav>\n</div>\n";
+    if page.turning.is_some() {
+        html += STAR;
     }
-    html += "<section id=\"figures\">\n<h2>Figures</h2>\n";
-    page.figures.iter().for_each(|one| figure(&mut html, one));
-    html += "</section>\n";
-    config(&mut html, page);
+    html += "</header>\n<main>\n";
+    verdict(&mut html, page);
+    page.sections.iter().for_each(|one| section(&mut html, one));
+    if is_assumed {
+        assumed(&mut html, page);
+    }
     html += "</main>\n";
     footer(&mut html, page);
+    if let Some(turning) = &page.turning {
+        let data = turning.to_string().replace('<', "\\u003c");
+        let _ = writeln!(html, "<script type=\"application/json\" id=\"star-data\">{data}</script>");
+        let _ = writeln!(html, "<script>\n{TURN}</script>");
+    }
     html + "</body>\n</html>\n"
 }
 
-fn subtitle(page: &Page) -> String {
-    let kinds: Vec<String> = page.chapters.iter().map(|chapter| chapter.heading.to_lowercase()).collect();
-    format!("Report of dimcmc: {}", kinds.join(", "))
-}
+/// The star that turns.
+const STAR: &str = "<div class=\"star\">\n<canvas id=\"star\" width=\"260\" height=\"260\" role=\"img\" \
+aria-label=\"The star as it turns, with the spots of the map\"></canvas>\n<p><button id=\"star-play\" \
+type=\"button\">Turn</button> <input id=\"star-time\" type=\"range\" min=\"0\" max=\"1000\" step=\"any\" value=\"0\" \
+aria-label=\"Time\"></p>\n<p id=\"star-told\"></p>\n<noscript><p>The maps below show the same.</p></noscript>\n</div>\n";
 
-fn chapter(html: &mut String, k: usize, chapter: &Chapter) {
-    let _ = writeln!(html, "<section id=\"chapter{k}\">\n<h2>{}</h2>", escape(&chapter.heading));
-    for (tone, sentence) in chapter.shown_verdicts() {
+const TURN: &str = include_str!("star.js");
+
+fn verdict(html: &mut String, page: &Page) {
+    if page.statements.is_empty() && page.warnings.is_empty() {
+        return;
+    }
+    html.push_str("<section id=\"verdict\">\n<h2>Verdict</h2>\n");
+    for Statement { kind, tone, sentence } in &page.statements {
         let class = match tone {
             Tone::Good => "verdict good",
             Tone::Neutral => "verdict",
             Tone::Doubt => "verdict doubt",
         };
-        let _ = writeln!(html, "<p class=\"{class}\">{}</p>", markup(sentence));
+        let (id, heading) = kind.names();
+        let sentence = markup(sentence);
+        let _ = writeln!(html, "<p class=\"{class}\">{sentence} <a href=\"#{id}\">{heading}</a></p>");
     }
-    list(html, "Warnings", "warnings", &chapter.warnings);
-    list(html, "Notes", "notes", &chapter.notes);
-    for (caption, one) in &chapter.tables {
+    list(html, "Warnings", "warnings", &page.warnings);
+    html.push_str("</section>\n");
+}
+
+fn section(html: &mut String, section: &Section) {
+    let (id, heading) = section.kind.names();
+    let _ = writeln!(html, "<section id=\"{id}\">\n<h2>{heading}</h2>");
+    section.figures.iter().for_each(|one| figure(html, one));
+    tables(html, &section.tables);
+    list(html, "", "notes", &section.notes);
+    let Folded { summary, figures, tables: folded } = &section.folded;
+    if !(figures.is_empty() && folded.is_empty()) {
+        let _ = writeln!(html, "<details>\n<summary>{summary}</summary>");
+        tables(html, folded);
+        figures.iter().for_each(|one| figure(html, one));
+        html.push_str("</details>\n");
+    }
+    html.push_str("</section>\n");
+}
+
+fn assumed(html: &mut String, page: &Page) {
+    html.push_str("<section id=\"assumed\">\n<h2>Assumptions</h2>\n<div class=\"beside\">\n");
+    tables(html, &page.assumed);
+    html.push_str("</div>\n");
+    list(html, "Measured on the observations", "notes", &page.measured);
+    if let Some(config) = &page.config {
+        let text = escape(&format!("{config:#}"));
+        let _ =
+            writeln!(html, "<details>\n<summary>Config, defaults filled in</summary>\n<pre>{text}</pre>\n</details>");
+    }
+    html.push_str("</section>\n");
+}
+
+/// Those that say something.
+fn tables(html: &mut String, tables: &[(String, Table)]) {
+    for (caption, one) in tables {
         let filled = one.without_empty_columns();
         if !filled.rows.is_empty() {
             table(html, caption, &filled);
         }
     }
-    html.push_str("</section>\n");
 }
 
 fn list(html: &mut String, heading: &str, class: &str, lines: &[String]) {
     if lines.is_empty() {
         return;
     }
-    let _ = writeln!(html, "<h3>{heading}</h3>\n<ul class=\"{class}\">");
+    if !heading.is_empty() {
+        let _ = writeln!(html, "<h3>{heading}</h3>");
+    }
+    let _ = writeln!(html, "<ul class=\"{class}\">");
     for line in lines {
         let _ = writeln!(html, "<li>{}</li>", markup(line));
     }
@@ -125,16 +193,6 @@ fn figure(html: &mut String, figure: &Figure) {
     let caption = markup(&figure.caption);
     let _ = writeln!(html, "<figure class=\"{class}\">\n<div class=\"scroll\">\n{}</div>", figure.svg());
     let _ = writeln!(html, "<figcaption>{caption}</figcaption>\n</figure>");
-}
-
-fn config(html: &mut String, page: &Page) {
-    let Some(config) = &page.config else { return };
-    let _ = writeln!(
-        html,
-        "<section id=\"config\">\n<h2>Config</h2>\n<p class=\"source\">As it was resolved, defaults filled \
-         in.</p>\n<details>\n<summary>Show</summary>\n<pre>{}</pre>\n</details>\n</section>",
-        escape(&format!("{config:#}"))
-    );
 }
 
 fn footer(html: &mut String, page: &Page) {

@@ -53,6 +53,7 @@ pub(super) fn chapter(file: &FitFile) -> Chapter {
         warnings: file.warnings.iter().chain(&file.checks.warnings).cloned().collect(),
         notes,
         tables: vec![(table.into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters)],
+        ..Chapter::default()
     }
 }
 

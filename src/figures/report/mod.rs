@@ -1,7 +1,8 @@
-//! One page of what a folder holds: star and data, the verdict in plain words and what speaks against it, tables,
-//! figures, the config and how to cite. A single HTML file that needs nothing else: no network, no script, figures as
-//! SVG within it.
+//! One page of a star: the verdict and what speaks against it, then velocities, dynamic spectra, maps, periodogram,
+//! posterior and limits, as far as folders hold them; what was assumed, and how to cite. A single HTML file that needs
+//! nothing else: no network, figures as SVG within it, and a script that turns the star where there is a map.
 
+mod assumed;
 mod chapter;
 mod chapters;
 mod citation;
@@ -10,36 +11,163 @@ mod injection;
 mod maps;
 mod planned;
 mod run;
+mod section;
 mod subject;
 mod verdicts;
 
+use crate::figures::drawing::Figure;
 use crate::figures::plot::{self, PlotError};
 use crate::numerics::text::escaped;
-use html::Page;
+use chapter::{Chapter, Table};
+use html::{Page, Statement};
+use section::Kind;
+use serde_json::Value;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use subject::About;
 
-/// The page of what `folder` holds, as HTML.
+/// What one folder holds.
+struct Part<'a> {
+    folder: &'a Path,
+    /// The folder's own name.
+    title: String,
+    chapters: Vec<(Kind, Chapter)>,
+    abouts: Vec<About>,
+    figures: Vec<Figure>,
+}
+
+impl<'a> Part<'a> {
+    fn read(folder: &'a Path) -> Result<Self, PlotError> {
+        let figures = plot::figures(folder, None)?;
+        let (mut read, mut abouts) = (Vec::new(), Vec::new());
+        for file in plot::kinds(folder) {
+            read.push((Kind::of_file(file), chapters::of(folder, file)?));
+            abouts.push(About::read(folder, file)?);
+        }
+        Ok(Part { folder, title: title(folder), chapters: read, abouts, figures })
+    }
+
+    fn config(&self) -> Option<&Value> {
+        self.abouts.iter().find_map(|about| about.config.as_ref())
+    }
+
+    /// The name that the config gives the star.
+    fn star_name(&self) -> Option<&str> {
+        subject::given_name(self.config()?)
+    }
+
+    fn data(&self) -> Option<&str> {
+        self.abouts.iter().find_map(|about| about.data_sha256.as_deref())
+    }
+}
+
+/// The page of a star of what `folders` hold, as HTML.
 ///
 /// # Errors
-/// [`PlotError`]: a folder that is not there or holds nothing that is known, files that are wrong.
-pub fn report(folder: &Path) -> Result<String, PlotError> {
-    let figures = plot::figures(folder, None)?;
-    let title = title(folder);
-    let mut page =
-        Page { title, subject: Vec::new(), chapters: Vec::new(), figures, config: None, provenance: Vec::new() };
-    for file in plot::kinds(folder) {
-        page.chapters.push(chapters::of(folder, file)?);
-        let about = subject::About::read(folder, file)?;
-        if page.subject.is_empty() {
-            page.subject = subject::lines(folder, &page.title, &about);
-        }
-        if page.provenance.is_empty() {
-            page.provenance = about.provenance();
-        }
-        page.config = page.config.or(about.config);
+/// [`PlotError`]: a folder that is not there or holds nothing that is known, files that are wrong, folders of different
+/// stars.
+pub fn report(folders: &[PathBuf]) -> Result<String, PlotError> {
+    let parts = folders.iter().map(|folder| Part::read(folder)).collect::<Result<Vec<Part>, PlotError>>()?;
+    for (k, part) in parts.iter().enumerate() {
+        parts[..k].iter().try_for_each(|before| same_star(before, part))?;
     }
-    Ok(html::page(&page))
+    let turning = folders.iter().find_map(|folder| plot::turning(folder).transpose()).transpose()?;
+    Ok(html::page(&page(parts, turning)))
+}
+
+/// Refuses two folders that are of different stars, and one that is there twice.
+fn same_star(first: &Part, other: &Part) -> Result<(), PlotError> {
+    let refuse = |problem: String| Err(PlotError::Content { path: other.folder.to_owned(), problem });
+    let folder = first.folder.display();
+    let whole = |part: &Part| part.folder.canonicalize().unwrap_or_else(|_| part.folder.to_owned());
+    if whole(first) == whole(other) {
+        return refuse("is given twice".into());
+    }
+    match ((first.star_name(), other.star_name()), (first.data(), other.data())) {
+        ((Some(a), Some(b)), _) if a == b => Ok(()),
+        ((Some(a), Some(b)), _) => refuse(format!("is of another star ({b}) than {folder} ({a})")),
+        (_, (Some(a), Some(b))) if a != b => refuse(format!(
+            "is of other observations than {folder}; if they are of one star, give both configs the same star.name"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// All that the page shows, of the parts of one star.
+fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
+    let config = parts.iter().find_map(Part::config).cloned();
+    let named = parts.iter().find_map(Part::star_name).map(str::to_owned);
+    let title = named.unwrap_or_else(|| match &config {
+        Some(config) => subject::name_from_folders(config, parts[0].folder),
+        None => parts[0].title.clone(),
+    });
+    let kinds = parts.iter().flat_map(|part| part.chapters.iter().map(|(_, chapter)| chapter.heading.to_lowercase()));
+    let kinds: Vec<String> = kinds.filter(|heading| !heading.is_empty()).collect();
+    let lines =
+        |part: &Part| part.abouts.iter().map(|about| subject::lines(part.folder, about)).find(|l| !l.is_empty());
+    let measured = unique(
+        parts
+            .iter()
+            .flat_map(|part| &part.abouts)
+            .flat_map(|about| about.measured.lines().into_iter().map(|(label, text)| format!("{label}: {text}"))),
+    );
+    let configs: Vec<(&str, &Value)> =
+        parts.iter().filter_map(|part| Some((part.title.as_str(), part.config()?))).collect();
+    let mut assumed: Vec<(String, Table)> = Vec::new();
+    if let Some(config) = &config {
+        assumed.push(("Fixed values.".into(), assumed::fixed(config)));
+        assumed.push(("Priors of the free parameters.".into(), assumed::priors(config)));
+        assumed.push((
+            "The folders have different configs; the tables above are of the first.".into(),
+            assumed::differences(&configs),
+        ));
+    }
+    Page {
+        subtitle: format!("Report of dimcmc: {}", kinds.join(", ")),
+        subject: parts.iter().find_map(lines).unwrap_or_default(),
+        turning,
+        statements: statements(&parts),
+        warnings: unique(
+            parts.iter().flat_map(|p| &p.chapters).flat_map(|(_, chapter)| chapter.warnings.iter().cloned()),
+        ),
+        provenance: parts
+            .iter()
+            .flat_map(|p| &p.abouts)
+            .map(About::provenance)
+            .find(|p| !p.is_empty())
+            .unwrap_or_default(),
+        sections: section::sections(parts),
+        assumed,
+        measured,
+        config,
+        title,
+    }
+}
+
+/// What all results come to: searches first, and no sentence twice.
+fn statements(parts: &[Part]) -> Vec<Statement> {
+    let mut all: Vec<&(Kind, Chapter)> = parts.iter().flat_map(|part| &part.chapters).collect();
+    all.sort_by_key(|(kind, _)| kind.rank());
+    let mut found: Vec<Statement> = Vec::new();
+    for (kind, chapter) in all {
+        for (tone, sentence) in chapter.shown_verdicts() {
+            if found.iter().all(|one| one.sentence != sentence) {
+                found.push(Statement { kind: *kind, tone, sentence: sentence.to_owned() });
+            }
+        }
+    }
+    found
+}
+
+/// The same, each once.
+fn unique(lines: impl Iterator<Item = String>) -> Vec<String> {
+    let mut found: Vec<String> = Vec::new();
+    for line in lines {
+        if !found.contains(&line) {
+            found.push(line);
+        }
+    }
+    found
 }
 
 /// Whether the file begins as a page does.

@@ -16,9 +16,7 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
     let mut notes = measured(manifest);
     notes.extend(upper_limits(summary));
     let truth = sampled.truth.as_ref();
-    let mut head = ["parameter", "median", "68 % interval", "95 % interval", "95 % HDI", "R-hat", "ESS", "τ (steps)"]
-        .map(String::from)
-        .to_vec();
+    let mut head = ["parameter", "median", "68 % interval", "95 % interval", "95 % HDI"].map(String::from).to_vec();
     if truth.is_some() {
         head.insert(1, "injected".into());
     }
@@ -62,32 +60,43 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
         warnings: warnings(manifest, summary),
         notes,
         tables: [
-            ("The sampled parameters.", parameters),
+            ("Sampled parameters.", parameters),
             ("Modes of the period.", period_modes(manifest, summary)),
-            ("What follows from them, draw by draw.", derived),
-            ("The chain.", chain),
+            ("Derived quantities.", derived),
         ]
         .into_iter()
         .filter(|(_, table)| !table.rows.is_empty())
         .map(|(caption, table)| (caption.to_owned(), table))
         .collect(),
+        diagnostics: vec![
+            ("Convergence of each parameter.".to_owned(), convergence_of(summary)),
+            ("The chain.".to_owned(), chain),
+        ],
     })
 }
 
 fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
     let digits = decimals(one.sd);
     let interval = |[low, high]: [f64; 2]| format!("{low:.digits$} to {high:.digits$}");
-    let optional = |x: Option<f64>, digits: usize| x.map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"));
     vec![
         label(name),
         if one.unconstrained { "unconstrained".into() } else { format!("{:.digits$}", one.median) },
         interval(one.ci68),
         interval(one.ci95),
         interval(one.hdi95),
-        optional(one.rhat, 3),
-        optional(one.ess, 0),
-        optional(one.tau, 1),
     ]
+}
+
+/// How well the chain tells each parameter.
+fn convergence_of(summary: &Summary) -> Table {
+    let optional = |x: Option<f64>, digits: usize| x.map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"));
+    let row = |(name, one): (&String, &ParameterSummary)| {
+        vec![label(name), optional(one.rhat, 3), optional(one.ess, 0), optional(one.tau, 1)]
+    };
+    let sampled = summary.names.iter().filter_map(|name| summary.parameters.get_key_value(name));
+    let derived = summary.derived_names.iter().filter_map(|name| summary.derived.get_key_value(name));
+    let head = ["parameter", "R-hat", "ESS", "τ (steps)"].map(String::from).to_vec();
+    Table { head, rows: sampled.chain(derived).map(row).collect() }
 }
 
 /// What the blind search and the chain say against it, and what else must be known beside the verdict.
@@ -146,11 +155,7 @@ fn convergence(summary: &Summary) -> (Tone, String) {
     let worst = all().filter_map(|one| one.rhat).fold(1.0, f64::max);
     let least = all().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
     let remark = if summary.advice.is_empty() { String::new() } else { format!(" But {}.", summary.advice.join("; ")) };
-    let sentence = format!(
-        "The chain has converged: independent ensembles agree on every parameter (R-hat at most {worst:.3}), and its \
-        draws are \
-         worth {least:.0} independent ones or more.{remark}"
-    );
+    let sentence = format!("Converged: max R-hat = {worst:.3}, min ESS = {least:.0}.{remark}");
     (if summary.advice.is_empty() { Tone::Good } else { Tone::Neutral }, sentence)
 }
 
@@ -163,7 +168,7 @@ fn meanings(summary: &Summary) -> impl Iterator<Item = String> {
 fn upper_limits(summary: &Summary) -> Vec<String> {
     let limit = |(name, one): (&String, &ParameterSummary)| {
         let digits = decimals(one.sd);
-        Some(format!("{} is compatible with zero: below {:.digits$} at 95 %.", label(name), one.upper95?))
+        Some(format!("{} < {:.digits$} (95 % upper limit).", label(name), one.upper95?))
     };
     summary.parameters.iter().chain(&summary.derived).filter_map(limit).collect()
 }

@@ -5,6 +5,7 @@ use crate::data::io::lsd;
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::provenance::Measured;
 use crate::figures::plot::PlotError;
+use crate::numerics::text::escaped;
 use crate::runs::origin;
 use serde::Deserialize;
 use serde_json::Value;
@@ -17,10 +18,12 @@ pub(super) struct About {
     /// The config with all defaults filled in.
     pub config: Option<Value>,
     version: Option<String>,
-    data_sha256: Option<String>,
+    /// Fingerprint of the observations.
+    pub data_sha256: Option<String>,
     profiles: Option<usize>,
     time_span_d: Option<[f64; 2]>,
-    measured: Measured,
+    /// What the config leaves to the observations.
+    pub measured: Measured,
 }
 
 impl About {
@@ -41,9 +44,8 @@ impl About {
     }
 }
 
-/// Star and data of the result in `folder`; `title` names what has no name of its own. Empty for files that say nothing
-/// of a star.
-pub(super) fn lines(folder: &Path, title: &str, about: &About) -> Vec<(String, String)> {
+/// Star and data of the result in `folder`. Empty for files that say nothing of a star.
+pub(super) fn lines(folder: &Path, about: &About) -> Vec<(String, String)> {
     let config = about.config.as_ref().unwrap_or(&Value::Null);
     let star: Vec<String> = [
         ("rotation_period_d", "*P*_{rot} = ", " d"),
@@ -59,17 +61,49 @@ pub(super) fn lines(folder: &Path, title: &str, about: &About) -> Vec<(String, S
     if star.is_empty() {
         return Vec::new();
     }
-    let mut lines = vec![("Star".to_owned(), format!("{}: {}", name(config).unwrap_or(title), star.join(", ")))];
+    let mut lines = vec![("Star".to_owned(), star.join(", "))];
     lines.extend(Data::of(folder, about).map(|data| ("Data".to_owned(), data.text())));
     let sets = about.measured.sets.iter().map(|set| ("Data set".to_owned(), set.line()));
     lines.extend(sets);
     lines
 }
 
-/// The name of the folder with the profiles, which is mostly that of the star.
-fn name(config: &Value) -> Option<&str> {
-    let list = Path::new(config.pointer("/observations/path")?.as_str()?);
-    list.parent()?.file_name()?.to_str().filter(|name| !name.is_empty() && *name != "..")
+/// The name that a config gives its star.
+pub(super) fn given_name(config: &Value) -> Option<&str> {
+    config.pointer("/star/name")?.as_str()
+}
+
+/// Names of folders that say nothing of the star whose data or results they hold.
+const GENERIC: [&str; 15] = [
+    "data",
+    "profiles",
+    "observations",
+    "obs",
+    "lsd",
+    "spectra",
+    "runs",
+    "results",
+    "out",
+    "output",
+    "work",
+    "tmp",
+    "figures",
+    "..",
+    ".",
+];
+
+/// What a star without a name is called: by the folder of its profiles, or that of its results, unless these have
+/// names such as `data`; else by the result.
+pub(super) fn name_from_folders(config: &Value, folder: &Path) -> String {
+    let says = |name: &&str| !name.is_empty() && !name.starts_with('.') && !GENERIC.contains(name);
+    let of = |path: Option<&Path>| {
+        path.and_then(Path::file_name).and_then(|name| name.to_str()).filter(says).map(str::to_owned)
+    };
+    let list = config.pointer("/observations/path").and_then(Value::as_str).map(Path::new);
+    let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let own = || whole.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();
+    let name = of(list.and_then(Path::parent)).or_else(|| of(whole.parent())).unwrap_or_else(own);
+    escaped(&name).into_owned()
 }
 
 /// The profiles: how many, and from when to when (d).
@@ -116,9 +150,21 @@ mod tests {
         let config = json!({ "star": star, "observations": { "path": "../data/lopeg/observations.txt" } });
         let whole = json!({ "config": config, "profiles": 44, "time_span_d": [2456892.4, 2456894.65] });
         let whole: About = serde_json::from_value(whole).unwrap();
-        let lines = lines(Path::new("absent"), "run", &whole);
-        assert_eq!(lines[0].1, "lopeg: *P*_{rot} = 0.4232 d, *v* sin *i* = 67.7 km/s, *i* = 45°");
+        let lines = lines(Path::new("absent"), &whole);
+        assert_eq!(lines[0].1, "*P*_{rot} = 0.4232 d, *v* sin *i* = 67.7 km/s, *i* = 45°");
         assert_eq!(lines[1].1, "44 profiles from 2456892.4000 d to 2456894.6500 d, a span of 2.25 d");
-        assert!(super::lines(Path::new("absent"), "run", &About::default()).is_empty());
+        assert!(super::lines(Path::new("absent"), &About::default()).is_empty());
+    }
+
+    #[test]
+    fn a_star_without_a_name_has_that_of_a_folder_that_says_something() {
+        let config = |path: &str| json!({ "observations": { "path": path } });
+        let name = |path: &str, folder: &str| name_from_folders(&config(path), Path::new(folder));
+        assert_eq!(name("../data/lopeg/observations.txt", "/absent/runs/map"), "lopeg");
+        assert_eq!(name("data/observations.txt", "/absent/au_mic/map"), "au_mic");
+        assert_eq!(name("data/observations.txt", "/absent/runs/demo"), "demo");
+        assert_eq!(name("observations.txt", "/absent/.tmp/run"), "run");
+        let named = json!({ "star": { "name": "LO Peg" } });
+        assert_eq!((given_name(&named), given_name(&json!({}))), (Some("LO Peg"), None));
     }
 }

@@ -10,8 +10,23 @@ use std::f64::consts::TAU;
 /// Lightest and heaviest star (solar masses).
 const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
 
+/// Longest name of a star (characters).
+const LONGEST_NAME: usize = 80;
+
+fn check_name(name: &str) -> Result<(), Fault> {
+    let length = name.chars().count();
+    let problem = match () {
+        () if name.trim().is_empty() => "must not be empty".to_owned(),
+        () if name.chars().any(char::is_control) => "must be one line without control characters".to_owned(),
+        () if length > LONGEST_NAME => format!("has {length} characters, at most {LONGEST_NAME} are allowed"),
+        () => return Ok(()),
+    };
+    Err(Fault::new("star.name", problem))
+}
+
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`.
 pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
+    star.name.as_deref().map_or(Ok(()), check_name)?;
     positive("star.rotation_period_d", star.rotation_period_d)?;
     check_size("star.rotation_period_d", star.rotation_period_d, most::TIME)?;
     check_size("star.epoch_d", star.epoch_d, most::TIME)?;

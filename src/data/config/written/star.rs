@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Star")]
 pub struct Star<Period = f64> {
+    /// Name of the star: the heading of its report, at most 80 characters. Results do not depend on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Rotation period (d), above 0; rotation cycles and `porb_over_prot` refer to it.
     pub rotation_period_d: Period,
     /// Time of rotation cycle 0 (d), on the time scale of the observations.

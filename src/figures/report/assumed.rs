@@ -1,0 +1,167 @@
+//! What a result assumes: fixed values, priors, and what was measured on the observations.
+
+use super::chapter::{Table, table};
+use crate::figures::plot::symbols::label;
+use crate::model::Parameter;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Keys of a config with what they are called, and units.
+const KEYS: [(&str, &str, &str); 24] = [
+    ("/star/rotation_period_d", "rotation period", "d"),
+    ("/star/epoch_d", "epoch of rotation phase 0", "d"),
+    ("/star/inclination_deg", "inclination", "°"),
+    ("/star/vsini_kms", "*v* sin *i*", "km/s"),
+    ("/star/vsys_kms", "systemic velocity", "km/s"),
+    ("/star/domega_rad_d", "differential rotation d*Ω*", "rad/d"),
+    ("/star/mass_msun", "stellar mass", "*M*_{Sun}"),
+    ("/star/limb_darkening/law", "limb-darkening law", ""),
+    ("/star/limb_darkening/coefficients", "limb-darkening coefficients", ""),
+    ("/star/photosphere_k", "photospheric temperature", "K"),
+    ("/star/spot_k", "spot temperature", "K"),
+    ("/star/wavelength_nm", "wavelength", "nm"),
+    ("/star/contrast", "brightness of a spot over that of the photosphere", ""),
+    ("/star/line/shape", "local line profile", ""),
+    ("/star/line/sigma_kms", "standard deviation of the local line", "km/s"),
+    ("/star/line/equivalent_width_kms", "equivalent width", "km/s"),
+    ("/instrument/resolving_power", "resolving power", ""),
+    ("/observations/sigma_scale", "scale of the uncertainties", ""),
+    ("/observations/velocity_jitter_kms", "RV jitter", "km/s"),
+    ("/imaging/objective", "surface model", ""),
+    ("/imaging/brightness", "pixels hold", ""),
+    ("/imaging/pixels", "pixels", ""),
+    ("/imaging/chi2_target", "target χ²/N", ""),
+    ("/imaging/spot_lifetime_d", "spot lifetime", "d"),
+];
+
+/// Keys that matter to static maps alone.
+const STATIC: [&str; 1] = ["/imaging/chi2_target"];
+
+/// Values that are held fixed.
+pub(super) fn fixed(config: &Value) -> Table {
+    let is_free = |pointer: &str| {
+        let key = pointer.rsplit('/').next().unwrap_or_default();
+        config.pointer(&format!("/parameters/{key}")).is_some()
+    };
+    let evolves = config.pointer("/imaging/objective").and_then(Value::as_str) == Some("marginal-likelihood");
+    let row = |(pointer, name, unit): &(&str, &str, &str)| {
+        let is_idle = evolves && STATIC.contains(pointer);
+        let value = config.pointer(pointer).filter(|value| !value.is_null() && !is_free(pointer) && !is_idle)?;
+        let unit = if unit.is_empty() || !value.is_number() { String::new() } else { format!(" {unit}") };
+        Some(vec![(*name).to_owned(), format!("{}{}", written(value), unit.replace(" °", "°"))])
+    };
+    Table { head: Vec::new(), rows: KEYS.iter().filter_map(row).collect() }
+}
+
+/// Priors of what is free.
+pub(super) fn priors(config: &Value) -> Table {
+    let of = |(name, prior): (&String, &Value)| {
+        let kind = prior.get("prior").map(written).unwrap_or_default();
+        let bound = |key: &str| prior.get(key).map(written);
+        let range = match (bound("min"), bound("max")) {
+            (Some(min), Some(max)) => format!("{min} to {max}"),
+            _ => {
+                let others = prior.as_object().into_iter().flatten().filter(|(key, _)| *key != "prior");
+                others.map(|(key, value)| format!("{key} {}", written(value))).collect::<Vec<_>>().join(", ")
+            }
+        };
+        vec![label(name), kind, range]
+    };
+    let mut rows: Vec<(usize, Vec<String>)> = config
+        .get("parameters")
+        .and_then(Value::as_object)
+        .into_iter()
+        .flatten()
+        .map(|entry| (Parameter::ALL.iter().position(|p| p.name() == entry.0).unwrap_or(usize::MAX), of(entry)))
+        .collect();
+    rows.sort();
+    table(&["parameter", "prior", "range"], rows.into_iter().map(|(_, row)| row).collect())
+}
+
+/// Keys in which the configs of several folders differ: key, and its value in each.
+pub(super) fn differences(configs: &[(&str, &Value)]) -> Table {
+    let flat: Vec<BTreeMap<String, String>> = configs
+        .iter()
+        .map(|(_, config)| {
+            let mut found = BTreeMap::new();
+            flatten("", config, &mut found);
+            found
+        })
+        .collect();
+    let mut keys: Vec<&String> = flat.iter().flat_map(BTreeMap::keys).collect();
+    keys.sort();
+    keys.dedup();
+    let decides = |key: &&&String| {
+        let idle = ["$schema", "grid", "plan", "sampler"];
+        !idle.contains(&key.split('.').next().unwrap_or_default()) && key.as_str() != "star.name"
+    };
+    let row = |key: &String| {
+        let values: Vec<String> =
+            flat.iter().map(|config| config.get(key).cloned().unwrap_or_else(|| "–".into())).collect();
+        let differ = values.windows(2).any(|pair| pair[0] != pair[1]);
+        differ.then(|| [vec![key.clone()], values].concat())
+    };
+    let head = std::iter::once("key".to_owned()).chain(configs.iter().map(|(folder, _)| (*folder).to_owned()));
+    Table { head: head.collect(), rows: keys.iter().filter(decides).filter_map(|key| row(key)).collect() }
+}
+
+/// All values with their dotted keys.
+fn flatten(key: &str, value: &Value, found: &mut BTreeMap<String, String>) {
+    match value {
+        Value::Object(map) => {
+            for (name, inner) in map {
+                let whole = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+                flatten(&whole, inner, found);
+            }
+        }
+        Value::Array(list) if list.iter().any(Value::is_object) => {
+            list.iter().enumerate().for_each(|(k, inner)| flatten(&format!("{key}[{k}]"), inner, found));
+        }
+        other => drop(found.insert(key.to_owned(), written(other))),
+    }
+}
+
+/// A value as text.
+fn written(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(list) => list.iter().map(written).collect::<Vec<_>>().join(", "),
+        // numbers that are long by a rounding error alone are not worth their digits
+        Value::Number(number) => match number.as_f64() {
+            Some(x) if number.to_string().len() > 12 => {
+                format!("{:.6}", x).trim_end_matches('0').trim_end_matches('.').into()
+            }
+            _ => number.to_string().trim_end_matches(".0").to_owned(),
+        },
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn what_is_free_is_not_fixed() {
+        let config = json!({
+            "star": { "rotation_period_d": 2.741, "vsini_kms": 30.0, "inclination_deg": 55 },
+            "imaging": { "objective": "marginal-likelihood", "chi2_target": 0.97 },
+            "parameters": { "vsini_kms": { "prior": "uniform", "min": 20, "max": 40.0 }, "phi": { "prior": "periodic" } }
+        });
+        let fixed = fixed(&config).rows;
+        assert!(fixed.contains(&vec!["rotation period".into(), "2.741 d".into()]), "{fixed:?}");
+        assert!(fixed.contains(&vec!["inclination".into(), "55°".into()]), "{fixed:?}");
+        assert!(!fixed.iter().any(|row| row[0].contains("sin") || row[0].contains("target")), "{fixed:?}");
+        let priors = priors(&config).rows;
+        assert_eq!(priors.iter().map(|row| row[1..].join(" ")).collect::<Vec<_>>(), ["periodic ", "uniform 20 to 40"]);
+    }
+
+    #[test]
+    fn only_keys_that_differ_are_listed() {
+        let other = |pixels: u32| json!({ "imaging": { "pixels": pixels, "x": 1 }, "grid": { "a": pixels } });
+        let [a, b] = [other(400), other(2000)];
+        assert_eq!(differences(&[("map", &a), ("run", &b)]).rows, [["imaging.pixels", "400", "2000"]]);
+        assert_eq!(differences(&[("map", &a), ("run", &a)]).rows.len(), 0);
+    }
+}
