@@ -3,6 +3,7 @@
 
 use crate::desk::{Desk, says, star};
 use crate::shared;
+use crate::svg::{extent, middle, paths, texts};
 use serde_json::{Value, json};
 
 /// A spotted star with a planet of that K at 2.3 rotations.
@@ -111,6 +112,17 @@ fn a_planet_that_is_there_is_taken_out() {
     let removed = &without["removed"];
     assert!((removed["k_kms"].as_f64().unwrap() + 0.5).abs() < 0.1, "{removed}");
     assert!((removed["porb_over_prot"].as_f64().unwrap() - 2.3).abs() < 0.1, "{removed}");
+    // the figures mark it
+    for (folder, label) in [("with", "highest peak: P = "), ("without", "removed: P = ")] {
+        desk.succeed(&["plot", folder]);
+        let svg = desk.read(&format!("{folder}/figures/limits.svg"));
+        assert!(texts(&svg).iter().any(|text| text.starts_with(label)), "{folder}: {:?}", texts(&svg));
+        let frame = extent(&paths(&svg, "frame")[0]);
+        for mark in paths(&svg, "planet") {
+            let within = |k: usize| (frame[k][0]..=frame[k][1]).contains(&middle(&mark)[k]);
+            assert!(within(0) && within(1), "{folder}: {mark:?}");
+        }
+    }
 }
 
 /// A star whose spots come and go, its systemic velocity and velocity jitter unknown: the search that orbits are put

@@ -75,19 +75,21 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     }
 
     let said = desk.succeed(&["plot", "maps"]);
-    says(&said, &["maps.svg", "changes.svg", "profiles.svg", "residuals.svg", "rv.svg"]);
+    says(&said, &["maps.svg", "maps_mollweide.svg", "changes.svg", "profiles.svg", "residuals.svg", "rv.svg"]);
     let strip = desk.read("maps/figures/maps.svg");
     let words = ["spot filling factor", "standard deviation of the filling factor"];
     for label in ["−2.00 d", "0.50 d", "10000.00 d"].into_iter().chain(words) {
         assert!(texts(&strip).contains(&label), "{label}: {:?}", texts(&strip));
     }
-    // three maps and three of their errors; nothing above latitude -30 is hidden at 50 degrees
-    assert_eq!((paths(&strip, "star").len(), paths(&strip, "unseen").len()), (6, 0));
+    // three maps and their mean error; nothing above latitude -30 is hidden at 50 degrees, but below -50 is
+    assert_eq!((paths(&strip, "star").len(), paths(&strip, "unseen").len()), (4, 0));
+    let flat = desk.read("maps/figures/maps_mollweide.svg");
+    assert_eq!((paths(&flat, "star").len(), paths(&flat, "unseen").len()), (4, 4));
     let changes = desk.read("maps/figures/changes.svg");
-    assert!(texts(&changes).contains(&"observed − unchanging star") && !changes.contains("NaN"));
+    assert!(texts(&changes).contains(&"observed − static map") && !changes.contains("NaN"));
     desk.succeed(&["report", "maps"]);
     let page = desk.read("maps/report.html");
-    for sentence in ["The spots live some", "Where the star changed.", "lifetime of the spots (d)"] {
+    for sentence in ["Evolving maps, one per night: spot lifetime", "Spot evolution.", "spot lifetime (d)"] {
         assert!(page.contains(sentence), "{sentence}");
     }
 }
@@ -104,7 +106,7 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     assert_eq!(desk.json("nights/map.json")["maps"].as_array().unwrap().len(), 5);
     desk.succeed(&["plot", "nights"]);
     // at 20 degrees what is below latitude -20 is never seen
-    assert_eq!(paths(&desk.read("nights/figures/maps.svg"), "unseen").len(), 10);
+    assert_eq!(paths(&desk.read("nights/figures/maps.svg"), "unseen").len(), 6);
 
     desk.set("/imaging/spot_lifetime_d", json!("static"));
     let said = desk.succeed(&["map", CONFIG, "--out", "static"]);
@@ -115,6 +117,48 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     let said = desk.succeed(&["plot", "static"]);
     assert!(said.contains("maps.svg") && !said.contains("changes.svg"), "{said}");
     desk.succeed(&["report", "static"]);
+}
+
+/// However many nights there are, each is drawn with its time, and colours go by what is on the star.
+#[test]
+fn every_night_is_drawn() {
+    let desk = Desk::new(config());
+    desk.succeed(&["map", CONFIG, "--out", "maps", "--times", "0.5,1.5"]);
+    let mut map = desk.json("maps/map.json");
+    let of_night = |k: u32| {
+        let mut night = map["maps"][k as usize % 2].clone();
+        night["time_d"] = json!(f64::from(k) + 0.25);
+        night
+    };
+    for nights in [13, 29, 50] {
+        let all: Vec<Value> = (0..nights).map(of_night).collect();
+        let mut many = map.clone();
+        many["maps"] = json!(all);
+        desk.write("maps/map.json", &many.to_string());
+        desk.succeed(&["plot", "maps", "--out", "out", "--force"]);
+        for file in ["out/maps.svg", "out/maps_mollweide.svg"] {
+            let svg = desk.read(file);
+            assert_eq!(paths(&svg, "star").len(), nights as usize + 1, "{file}");
+            for night in 0..nights {
+                assert!(texts(&svg).contains(&format!("{night}.25 d").as_str()), "{file}: night {night}");
+            }
+            assert_eq!(texts(&svg).iter().filter(|text| **text == "mean standard deviation").count(), 1);
+        }
+        let svg = desk.read("out/maps.svg");
+        for label in ["phase 0", "0.25", "0.5", "0.75", "+60°", "+30°", "0°", "rotation"] {
+            assert!(texts(&svg).contains(&label), "{label}");
+        }
+        assert!(paths(&svg, "rotation").len() >= nights as usize);
+    }
+    // features of 0.3: the scale ends there
+    let faint = |x: &Value| json!(if x.as_f64().unwrap() > 0.1 { 0.3 } else { 0.0 });
+    for one in map["maps"].as_array_mut().unwrap() {
+        one["spot_filling"] = one["spot_filling"].as_array().unwrap().iter().map(faint).collect();
+    }
+    desk.write("maps/map.json", &map.to_string());
+    desk.succeed(&["plot", "maps", "--out", "out", "--force"]);
+    let svg = desk.read("out/maps.svg");
+    assert!(texts(&svg).contains(&"0.3") && !texts(&svg).contains(&"0.4"), "{:?}", texts(&svg));
 }
 
 #[test]

@@ -74,7 +74,7 @@ fn a_run_gives_what_is_usually_quoted() {
         }
     }
     let page = desk.succeed(&["report", "run"]) + &desk.read("run/report.html");
-    says(&page, &["What follows from them, draw by draw", PHI]);
+    says(&page, &["Derived quantities", PHI]);
     for (name, mut values) in NAMES.into_iter().zip(kept) {
         values.sort_by(f64::total_cmp);
         let one = &summary["derived"][name];

@@ -19,7 +19,7 @@ fn unchanging() -> Value {
 
 const FIGURES: [(&str, &[&str]); 7] = [
     ("simulate", &["map", "profiles"]),
-    ("map", &["maps", "changes", "profiles", "residuals", "rv"]),
+    ("map", &["maps", "maps_mollweide", "changes", "profiles", "residuals", "rv"]),
     ("periodogram", &["periodogram", "rv"]),
     ("optimise", &["optimum"]),
     ("grid", &["landscape"]),
@@ -50,19 +50,29 @@ fn every_folder_has_its_figures() {
         }
     }
     for (file, labels) in [
-        ("sample/figures/corner.svg", &["K (km/s)", "φ (cycles to max. RV)", "τspot (d)", "injected"][..]),
+        ("sample/figures/corner.svg", &["K (m/s)", "φ (cycles to max. RV)", "spot lifetime (d)", "injected"][..]),
         ("sample/figures/traces.svg", &["step", "ensemble 2", "burn-in"]),
         (
             "map/figures/rv.svg",
-            &["RV (km/s)", "rotation cycle", "orbital phase (0: maximal RV)", "model", "assumed orbit"],
+            &[
+                "RV (km/s)",
+                "RV − spots (m/s)",
+                "residual (m/s)",
+                "time (d)",
+                "rotation cycle",
+                "model",
+                "assumed orbit",
+            ],
         ),
-        ("map/figures/residuals.svg", &["velocity (km/s)", "rotation phase", "standard errors"]),
+        ("map/figures/rv.svg", &["orbital phase (0: maximal RV)", "K = 200 m/s, P = 5.100 d = 1.700 Prot"]),
+        ("map/figures/residuals.svg", &["velocity (km/s)", "rotation phase", "uncertainties (σ)"]),
         (
             "simulate/figures/map.svg",
             &["phase 0", "rotation", "longitude", "latitude", "observed phases", "+60°", "spot filling factor"],
         ),
-        ("map/figures/maps.svg", &["0.62 d", "most probable", "standard dev.", "spot filling factor"]),
-        ("map/figures/changes.svg", &["observed − unchanging star", "observed − changing star", "time (d)"]),
+        ("map/figures/maps.svg", &["0.62 d", "mean standard deviation", "phase 0", "rotation", "spot filling factor"]),
+        ("map/figures/maps_mollweide.svg", &["0.62 d", "mean standard deviation", "−30°", "270°"]),
+        ("map/figures/changes.svg", &["observed − static map", "observed − evolving maps", "time (d)"]),
         ("periodogram/figures/periodogram.svg", &["period (d)", "Δ ln L", "window", "0.1 %", "Prot/2", "injected"]),
         ("grid/figures/landscape.svg", &["√Δχ2", "Δχ2 = 2.30, 5.99", "paraboloid"]),
         ("compare/figures/comparison.svg", &["chain", "paraboloid", "landscape", "injected"]),
@@ -165,6 +175,7 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
     desk.write("run/chain.jsonl", &text);
     desk.succeed(&["plot", "run", "--out", "out"]);
     let svg = desk.read("out/corner.svg");
+    assert!(texts(&svg).contains(&"Porb (d)"), "{:?}", texts(&svg));
     let all = placed(&svg);
     // titles: above the panel, no wider than it, and no number where none means anything
     let is_title = |text: &str| text.contains("unconstrained") || text.contains('±') || text.contains('+');
@@ -176,7 +187,7 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
         let [left, right] = title.x;
         assert!(right - left < side + 1.0, "{}: {left} {right}", title.text);
     }
-    // 0.5, 1 and 2 are as far from each other
+    // 5, 10 and 20 d are as far from each other
     let baseline = all.iter().map(|one| one.y).filter(|y| all.iter().filter(|one| one.y == *y).count() > 4);
     let baseline = baseline.fold(0.0, f64::max);
     let numbers: Vec<_> = all.iter().filter(|one| one.y == baseline).collect();
@@ -185,12 +196,35 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
         let found = found.unwrap_or_else(|| panic!("{text} is not among {:?}", texts(&svg)));
         0.5 * (found.x[0] + found.x[1])
     };
-    let (first, second) = (centre("1") - centre("0.5"), centre("2") - centre("1"));
+    let (first, second) = (centre("10") - centre("5"), centre("20") - centre("10"));
     assert!((first - second).abs() < 1.0, "{first} {second}");
     // no number touches another
     let mut ends: Vec<[f64; 2]> = numbers.iter().map(|one| one.x).collect();
     ends.sort_by(|a, b| a[0].total_cmp(&b[0]));
     assert!(ends.windows(2).all(|pair| pair[0][1] + 2.0 < pair[1][0]), "{ends:?}");
+}
+
+/// Two seasons 300 d apart have a panel each in every row, and no orbit is drawn through the gap between them.
+#[test]
+fn gaps_between_seasons_are_gaps() {
+    let desk = Desk::new(unchanging());
+    let mut cycles = unchanging()["observations"]["simulate"]["cycles"].as_array().unwrap().clone();
+    cycles.truncate(6);
+    let later: Vec<Value> = cycles.iter().map(|cycle| json!(cycle.as_f64().unwrap() + 100.0)).collect();
+    cycles.extend(later);
+    desk.set("/observations/simulate/cycles", json!(cycles));
+    desk.succeed(&["map", CONFIG, "--out", "map"]);
+    desk.succeed(&["plot", "map"]);
+    let svg = desk.read("map/figures/rv.svg");
+    // three rows of two, and two that are folded
+    let (frames, orbits) = (paths(&svg, "frame"), paths(&svg, "orbit"));
+    assert_eq!((frames.len(), orbits.len()), (8, 3));
+    let [first, second] = [0, 1].map(|k| extent(&frames[k])[0]);
+    assert!(first[1] + 5.0 < second[0], "{first:?} {second:?}");
+    for (orbit, frame) in orbits.iter().zip([first, second]) {
+        let [left, right] = extent(orbit)[0];
+        assert!(left >= frame[0] - 0.1 && right <= frame[1] + 0.1, "{left} {right} {frame:?}");
+    }
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub const WALKERS: usize = 8;
 pub fn config() -> Value {
     let sampler = json!({ "ensembles": ENSEMBLES, "walkers": WALKERS, "steps": 60, "ess": 80, "rhat": 1.1, "seed": 3 });
     let mut config = two_spots(sampler);
+    config["star"]["name"] = json!("Beta & Co");
     let simulate = config["observations"]["simulate"].as_object_mut().unwrap();
     simulate.remove("spots");
     simulate.insert("random_spots".into(), json!({ "number": 6, "lifetime_d": 8, "seed": 2 }));

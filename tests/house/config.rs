@@ -179,6 +179,7 @@ fn only_what_may_change_on_resuming_leaves_the_fingerprint() {
         ("/sampler/ess", json!(10)),
         ("/grid", Value::Null),
         ("/star/wavelength_nm", json!(550)),
+        ("/star/name", json!("LO Peg")),
     ] {
         assert_eq!(after(pointer, value), before, "{pointer}");
     }
@@ -190,6 +191,20 @@ fn only_what_may_change_on_resuming_leaves_the_fingerprint() {
         ("/observations/simulate/snr", json!(900)),
     ] {
         assert_ne!(after(pointer, value), before, "{pointer}");
+    }
+}
+
+#[test]
+fn a_star_has_a_name_in_one_line() {
+    let named = |name: Value| resolve(&with(demo(), "/star/name", name));
+    assert_eq!(named(json!("AU Mic")).unwrap().resolved["star"]["name"], "AU Mic");
+    for (name, problem) in [
+        (json!(""), "must not be empty"),
+        (json!("a\nb"), "one line"),
+        (json!("x".repeat(81)), "81 characters, at most 80"),
+    ] {
+        let message = named(name).unwrap_err().to_string();
+        assert!(message.contains("star.name") && message.contains(problem), "{message}");
     }
 }
 

@@ -117,7 +117,7 @@ struct Found {
 
 impl Found {
     fn words(&self) -> String {
-        let k = self.k_kms.map_or(String::new(), |k| format!(", *K* = {}", speed(k, 0.02 * k)));
+        let k = self.k_kms.map_or(String::new(), |k| format!(", *K* = {}", speed(k, 0.1 * k)));
         format!("*P* = {:.2} d{k}", self.period_d)
     }
 }

@@ -115,12 +115,12 @@ impl Nights {
         let panels = self.maps.len() + 1;
         let columns = kind.columns(panels);
         let mut figure = Figure::new(kind.name(), PAGE_MM, 100.0);
-        let cell = ((figure.width - MARGIN) / columns as f64).min(WIDEST);
+        let cell = ((figure.width - MARGIN[0] - MARGIN[1]) / columns as f64).min(WIDEST);
         let (radius, block) = kind.measures(cell);
         let rows = panels.div_ceil(columns);
         figure.height = block * rows as f64 + 44.0;
         figure.caption = self.caption(kind);
-        let left = MARGIN + 0.5 * (figure.width - MARGIN - cell * columns as f64);
+        let left = MARGIN[0] + 0.5 * (figure.width - MARGIN[0] - MARGIN[1] - cell * columns as f64);
         for k in 0..panels {
             let (row, column) = (k / columns, k % columns);
             let place = [left + cell * (column as f64 + 0.5), block * row as f64];
@@ -136,7 +136,8 @@ impl Nights {
                     let centre = [place[0], place[1] + 23.0 + radius];
                     let projection = Projection::Polar { centre, radius };
                     self.paint(&mut figure, pixels, projection, scale);
-                    self.around(&mut figure, times, (centre, radius), is_labelled);
+                    let sides = [column == 0, column + 1 == columns || k + 1 == panels];
+                    self.around(&mut figure, times, (centre, radius), (is_labelled, sides));
                 }
                 Kind::Mollweide => {
                     let centre = [place[0], place[1] + 14.0 + radius];
@@ -198,8 +199,15 @@ impl Nights {
         self.observed.iter().filter(move |[time, _]| near(*time)).map(|[_, cycle]| *cycle)
     }
 
-    /// What is around a polar map: phases, those observed, latitudes, and the sense of rotation.
-    fn around(&self, figure: &mut Figure, time_d: Option<f64>, (centre, radius): (Point, f64), is_labelled: bool) {
+    /// What is around a polar map: phases, to the sides where no other map is; those observed; latitudes; and the
+    /// sense of rotation.
+    fn around(
+        &self,
+        figure: &mut Figure,
+        time_d: Option<f64>,
+        (centre, radius): (Point, f64),
+        (is_labelled, [left, right]): (bool, [bool; 2]),
+    ) {
         let toward = |phase: f64, distance: f64| {
             let (sin, cos) = (-360.0 * phase).to_radians().sin_cos();
             [centre[0] + distance * sin, centre[1] + distance * cos]
@@ -208,12 +216,15 @@ impl Nights {
             let tick = [toward(cycle, radius + 0.8), toward(cycle, radius + 4.5)];
             figure.path("observed-phase", open(&tick), Paint::stroke(Stroke::new(BLACK, 0.7)));
         }
-        for (phase, text, align, down) in [
-            (0.0, "phase 0", Align::Centre, 4.5),
-            (0.25, "0.25", Align::Right, 2.0),
-            (0.5, "0.5", Align::Centre, -0.5),
-            (0.75, "0.75", Align::Left, 2.0),
+        for (phase, text, align, down, is_shown) in [
+            (0.0, "phase 0", Align::Centre, 4.5, true),
+            (0.25, "0.25", Align::Right, 2.0, left),
+            (0.5, "0.5", Align::Centre, -0.5, true),
+            (0.75, "0.75", Align::Left, 2.0, right),
         ] {
+            if !is_shown {
+                continue;
+            }
             let at = toward(phase, radius + 5.5);
             let text = if is_labelled { text } else { text.trim_start_matches("phase ") };
             figure.text(text, [at[0], at[1] + down], TINY, align, 0.0);
@@ -250,7 +261,13 @@ impl Nights {
         if below {
             for longitude in [0.0, 90.0, 180.0, 270.0, 360.0] {
                 let at = [projection.place(longitude, 0.0)[0], bottom + 11.5];
-                figure.text(&format!("{longitude}°"), at, TINY, Align::Centre, 0.0);
+                // those of neighbours do not touch
+                let align = match longitude {
+                    0.0 => Align::Left,
+                    360.0 => Align::Right,
+                    _ => Align::Centre,
+                };
+                figure.text(&format!("{longitude}°"), at, TINY, align, 0.0);
             }
         }
     }
@@ -267,8 +284,8 @@ impl Nights {
     }
 }
 
-/// Room to the left (pt).
-const MARGIN: f64 = 12.0;
+/// Room to the left and to the right (pt).
+const MARGIN: [f64; 2] = [15.0, 15.0];
 
 /// Width of the widest map with what is around it (pt).
 const WIDEST: f64 = 165.0;
@@ -316,7 +333,7 @@ impl Kind {
     fn measures(self, cell: f64) -> (f64, f64) {
         match self {
             Kind::Polar => {
-                let radius = 0.5 * cell - 16.0;
+                let radius = 0.5 * cell - 9.0;
                 (radius, 2.0 * radius + 40.0)
             }
             Kind::Mollweide => {

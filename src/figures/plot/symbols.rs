@@ -45,7 +45,7 @@ fn unit(parameter: Parameter) -> &'static str {
 
 /// What velocities (km/s) are drawn in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Speeds {
+pub struct Speeds {
     /// What a velocity in km/s is multiplied by.
     pub factor: f64,
     /// The unit.
@@ -84,7 +84,7 @@ pub fn label(name: &str) -> String {
 
 /// A parameter as figures show it: periods in days, small velocities in m/s.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Shown {
+pub struct Shown {
     symbol: String,
     unit: &'static str,
     /// What its values are multiplied by.
@@ -133,7 +133,7 @@ impl Title {
     pub const LINES: usize = 3;
 
     /// A value with its error bars, downwards and upwards, of which `sigma` has two digits; none of them multiplied yet.
-    pub(super) fn value(shown: &Shown, value: f64, [down, up]: [f64; 2], sigma: f64) -> Self {
+    pub fn value(shown: &Shown, value: f64, [down, up]: [f64; 2], sigma: f64) -> Self {
         let digits = decimals(shown.factor * sigma);
         let [value, down, up] = [value, down, up].map(|x| format!("{:.digits$}", shown.factor * x));
         let unit = match shown.unit {
@@ -151,7 +151,7 @@ impl Title {
     }
 
     /// Of a parameter that the data do not constrain, so that no value means anything.
-    pub(super) fn unconstrained(shown: &Shown) -> Self {
+    pub fn unconstrained(shown: &Shown) -> Self {
         Title { symbol: shown.symbol.clone(), value: None, errors: String::new(), unit: String::new() }
     }
 
@@ -163,7 +163,11 @@ impl Title {
             (None, _) => vec![symbol.clone(), "unconstrained".to_owned()],
             (Some(value), 1) => vec![format!("{symbol} = {value} {errors}{unit}")],
             (Some(value), 2) => vec![symbol.clone(), format!("{value} {errors}{unit}")],
-            (Some(value), _) => vec![symbol.clone(), value.clone(), errors.clone()],
+            (Some(value), _) => {
+                let unit = unit.trim();
+                let head = if unit.is_empty() { symbol.clone() } else { format!("{symbol} ({unit})") };
+                vec![head, value.clone(), errors.clone()]
+            }
         }
     }
 }

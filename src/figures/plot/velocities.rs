@@ -167,7 +167,7 @@ impl Curves<'_> {
     fn draw(&self) -> Figure {
         let rows = if self.folds() { &ROWS[..] } else { &ROWS[..2] };
         let mut figure = Figure::new("rv", PAGE_MM, 30.0 + 26.0 * rows.len() as f64);
-        let (left, top, gap) = (38.0, 46.0, 7.0);
+        let (left, top, gap) = (38.0, 38.0, 7.0);
         let width = if self.folds() { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
         let room = figure.height - top - 28.0 - gap * (rows.len() as f64 - 1.0);
         let total: f64 = rows.iter().sum();
@@ -208,7 +208,7 @@ impl Curves<'_> {
             let below = beside(frames[2]);
             self.fold(&mut figure, [above, below], unit);
         }
-        legend.row(&mut figure, [middle, 9.0]);
+        legend.row(&mut figure, [middle, 7.0]);
         figure
     }
 

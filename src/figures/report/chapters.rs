@@ -6,9 +6,9 @@ use crate::data::io::map::{FIT, MAP};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
-use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
+use crate::figures::plot::symbols::{PERIOD_DIGITS, Shown, Speeds, decimals, label, symbol};
 use crate::model::{Estimate, OrbitQuantity, Parameter, Quoted, definition, quoted_definition};
-use crate::planets::verdict::probability;
+use crate::planets::verdict::{SIMULATED_FAP, probability};
 use crate::runs::blind_search::{self, PeakRecord, PeriodogramFile};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
@@ -62,8 +62,10 @@ fn search(file: &PeriodogramFile) -> Chapter {
     let best = &file.best;
     let injected = |parameter: Parameter| file.truth.as_ref().and_then(|truth| truth.get(parameter));
     let row = |name: &str, value: f64, sigma: Option<f64>, truth: Option<f64>| {
+        let shown = Shown::of(name, None, value);
+        let [sigma, truth] = [sigma, truth].map(|x| x.map(|x| shown.factor * x));
         let digits = digits_of(sigma, 3);
-        vec![label(name), number(value, digits), number(sigma, digits), number(truth, digits)]
+        vec![shown.label(), number(shown.factor * value, digits), number(sigma, digits), number(truth, digits)]
     };
     let mut orbit = vec![
         row("k_kms", best.k_kms, Some(best.sigma_k_kms), injected(Parameter::K)),
@@ -79,26 +81,32 @@ fn search(file: &PeriodogramFile) -> Chapter {
         notes.extend(note(quantity.name(), quantity.definition()));
     }
     notes.push(file.co_rotation.statement.clone());
+    notes.extend(file.evidence.as_ref().map(|evidence| evidence.sentence.clone()));
+    let unit = Speeds::of(&file.peaks.iter().map(|peak| peak.orbit.k_kms).collect::<Vec<_>>());
     let peak = |peak: &PeakRecord| {
-        let alias = peak.alias.as_ref().map(|alias| format!("of the first, by {:.3}/d", alias.window_frequency_per_d));
+        let alias = peak.alias.as_ref().map(|alias| format!("of 1 at {:.3}/d", alias.window_frequency_per_d));
         vec![
             number(peak.orbit.period_d, digits_of(peak.orbit.sigma_period_d, PERIOD_DIGITS)),
-            number(peak.orbit.k_kms, 3),
-            number(peak.orbit.sigma_k_kms, 3),
+            number(unit.factor * peak.orbit.k_kms, digits_of(Some(unit.factor * peak.orbit.sigma_k_kms), 3)),
+            number(unit.factor * peak.orbit.sigma_k_kms, digits_of(Some(unit.factor * peak.orbit.sigma_k_kms), 3)),
             number(peak.orbit.delta_ln_l, 2),
-            probability(peak.false_alarm_probability),
+            match peak.false_alarm_probability {
+                p if p < SIMULATED_FAP => format!("< {SIMULATED_FAP:e}"),
+                p => probability(p),
+            },
             alias.unwrap_or_else(|| NOTHING.into()),
             peak.rotation.clone().unwrap_or_else(|| NOTHING.into()),
         ]
     };
-    let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias", "period of the star"];
+    let k = format!("*K* ({})", unit.name);
+    let head = ["period (d)", &k, "*σ*_{K}", "Δ ln *L*", "FAP", "alias", "rotation"];
     Chapter {
         heading: "Search for a planet".into(),
         verdicts: vec![verdicts::of(&file.verdict)],
         warnings: file.warnings.clone(),
         notes,
         tables: vec![
-            ("The best orbit.".into(), table(&["parameter", "best", "error", "injected"], orbit)),
+            ("The best orbit.".into(), table(&["parameter", "best", "uncertainty", "injected"], orbit)),
             ("Peaks of the periodogram.".into(), table(&head, file.peaks.iter().map(peak).collect())),
         ],
         diagnostics: Vec::new(),
@@ -164,8 +172,10 @@ fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
 
 fn best(file: &OptimumFile) -> Chapter {
     let row = |name: &str, value: Option<f64>, sd: Option<f64>, truth: Option<f64>| {
+        let shown = Shown::of(name, None, value.unwrap_or(f64::NAN));
+        let [value, sd, truth] = [value, sd, truth].map(|x| x.map(|x| shown.factor * x));
         let digits = digits_of(sd, 4);
-        vec![label(name), number(value, digits), number(sd, digits), number(truth, digits)]
+        vec![shown.label(), number(value, digits), number(sd, digits), number(truth, digits)]
     };
     let of = |name: &String| {
         let get = |values: &BTreeMap<String, f64>| values.get(name).copied();
@@ -194,8 +204,8 @@ fn best(file: &OptimumFile) -> Chapter {
         warnings: remarks.chain(file.reference.warnings(&file.names)).collect(),
         notes,
         tables: vec![(
-            "The best parameters, with errors from the curvature.".into(),
-            table(&["parameter", "best", "error", "injected"], rows),
+            "The best parameters, with uncertainties from the curvature.".into(),
+            table(&["parameter", "best", "uncertainty", "injected"], rows),
         )],
         ..Chapter::default()
     }
@@ -320,8 +330,8 @@ mod tests {
         assert_eq!(chapter.tables[0].1.rows.len(), 5);
         // spots are nowhere, aliases are
         let peaks = chapter.tables[1].1.without_empty_columns();
-        assert_eq!(peaks.head, ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias"]);
-        assert_eq!(peaks.rows[1], ["1.33", "0.100", "0.010", "20.00", "1.0e-5", "of the first, by 1.003/d"]);
+        assert_eq!(peaks.head, ["period (d)", "*K* (m/s)", "*σ*_{K}", "Δ ln *L*", "FAP", "alias"]);
+        assert_eq!(peaks.rows[1], ["1.33", "100", "10", "20.00", "< 1e-4", "of 1 at 1.003/d"]);
     }
 
     #[test]
@@ -346,7 +356,7 @@ mod tests {
         assert_eq!(short.warnings, ["neighbours are correlated"]);
         let (tone, sentence) = short.shown_verdicts().next().unwrap();
         assert_eq!(tone, Tone::Doubt);
-        assert!(sentence.contains("stopped short of the target chi2") && !sentence.contains("converge"), "{sentence}");
+        assert!(sentence.contains("stopped short of the target χ²") && !sentence.contains("converge"), "{sentence}");
         assert_eq!(chapter("converged").shown_verdicts().next().unwrap().0, Tone::Neutral);
     }
 

@@ -229,17 +229,22 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The markup of figures as HTML: `*italic*`, `_{subscript}`, `^{superscript}`.
+/// The markup of figures as HTML: `*italic*`, `_{subscript}`, `^{superscript}`; and what is between backticks as code.
 fn markup(text: &str) -> String {
     // a lone star or brace is a character like any other
     if text.matches('*').count() % 2 == 1 {
         return escape(&plain(text));
     }
+    let has_code = text.matches('`').count() % 2 == 0;
     let mut html = String::new();
-    let (mut italic, mut script) = (false, None);
+    let (mut italic, mut script, mut code) = (false, None, false);
     let mut characters = text.chars().peekable();
     while let Some(character) = characters.next() {
         match character {
+            '`' if has_code => {
+                html += if code { "</code>" } else { "<code>" };
+                code = !code;
+            }
             '*' => {
                 html += if italic { "</i>" } else { "<i>" };
                 italic = !italic;
@@ -261,5 +266,6 @@ fn markup(text: &str) -> String {
 #[test]
 fn markup_is_html_and_nothing_else_is() {
     assert_eq!(markup("*P*_{orb} < 1"), "<i>P</i><sub>orb</sub> &lt; 1");
-    assert_eq!(markup("a_b {c} `d`"), "a_b {c} `d`");
+    assert_eq!(markup("a_b {c} `d` e"), "a_b {c} <code>d</code> e");
+    assert_eq!(markup("a lone ` stays"), "a lone ` stays");
 }

@@ -1,7 +1,8 @@
-//! What is said of orbits that were put into profiles, and of limits found that way.
+//! Injected orbits, and detection limits by injection and recovery.
 
 use super::chapter::{Chapter, Table, number, pairs};
 use crate::data::io::truth::InjectedTruth;
+use crate::figures::plot::symbols::Speeds;
 use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;
 
@@ -15,29 +16,42 @@ pub(super) fn injection(truth: &InjectedTruth) -> Chapter {
     let rows = rows.map(|(name, value)| (name, number(value, 4)));
     Chapter {
         heading: "Injection".into(),
-        tables: vec![("The orbit put into observed profiles.".into(), pairs(&rows))],
+        tables: vec![("The injected orbit.".into(), pairs(&rows))],
         ..Chapter::default()
     }
 }
 
 /// Of `limits.json`.
 pub(super) fn limits(file: &LimitsFile) -> Chapter {
+    let unit = Speeds::of(&file.k_kms);
     let row = |limit: &Limit| {
         let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
-        vec![number(period_d, 4), number(porb_over_prot, 3), number(k50_kms, 3), number(k95_kms, 3)]
+        let k = |kms: Option<f64>| number(kms.map(|kms| unit.factor * kms), if unit == Speeds::KMS { 3 } else { 0 });
+        vec![number(period_d, 4), number(porb_over_prot, 3), k(k50_kms), k(k95_kms)]
     };
-    let head = ["period (d)", "*P*_{orb}/*P*_{rot}", "*K* (km/s), 50 %", "95 %"].map(str::to_owned).to_vec();
+    let k = format!("*K* ({}), 50 %", unit.name);
+    let head = ["period (d)", "*P*_{orb}/*P*_{rot}", &k, "95 %"].map(str::to_owned).to_vec();
     let rows = file.limits.iter().step_by(file.limits.len().div_ceil(SHOWN).max(1)).map(row).collect();
-    let mut tables = vec![("Recovered at 50 and 95 % of the phases.".to_owned(), Table { head, rows })];
+    let diagnostics = vec![("*K* recovered at 50 and 95 % of the phases.".to_owned(), Table { head, rows })];
+    let mut tables = Vec::new();
     if let Some(agreement) = &file.agreement {
         let rows = [
             ("orbits near the limit", agreement.orbits),
-            ("recovered by the shortcut", agreement.by_shortcut),
-            ("recovered the whole way", agreement.by_full),
-            ("alike", agreement.agree),
+            ("recovered by the linearised search", agreement.by_shortcut),
+            ("recovered by the full pipeline", agreement.by_full),
+            ("same result", agreement.agree),
         ];
         let rows = rows.map(|(name, count)| (name, count.to_string()));
-        tables.push(("The linear shortcut against resampled profiles.".into(), pairs(&rows)));
+        tables.push((
+            "The linearised search compared with the full pipeline on resampled profiles.".into(),
+            pairs(&rows),
+        ));
     }
-    Chapter { heading: "Detection limits".into(), tables, warnings: file.warnings.clone(), ..Chapter::default() }
+    Chapter {
+        heading: "Detection limits".into(),
+        tables,
+        warnings: file.warnings.clone(),
+        diagnostics,
+        ..Chapter::default()
+    }
 }

@@ -1,10 +1,11 @@
 //! What is said of a run.
 
-use super::chapter::{Chapter, NOTHING, Table, Tone};
+use super::chapter::{Chapter, NOTHING, Table, Tone, number};
 use super::verdicts;
-use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
+use crate::figures::plot::symbols::{PERIOD_DIGITS, Shown, decimals, label, symbol};
 use crate::figures::plot::{PlotError, Sampled};
 use crate::planets::modes::PeriodMode;
+use crate::planets::verdict::speed;
 use crate::runs::manifest::{Manifest, RunSummary};
 use crate::sampling::chain::{ParameterSummary, Summary};
 use std::path::Path;
@@ -14,6 +15,7 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
     let sampled = Sampled::read(folder)?;
     let (manifest, summary) = (&sampled.manifest, &sampled.summary);
     let mut notes = measured(manifest);
+    notes.extend(summary.remarks.iter().filter(|line| line.starts_with(BAYES)).cloned());
     notes.extend(upper_limits(summary));
     let truth = sampled.truth.as_ref();
     let mut head = ["parameter", "median", "68 % interval", "95 % interval", "95 % HDI"].map(String::from).to_vec();
@@ -24,8 +26,7 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
         let one = &summary.parameters[name];
         let mut row = cells(name, one);
         if let Some(truth) = truth {
-            let digits = decimals(one.sd);
-            row.insert(1, truth.get(name).map_or_else(|| NOTHING.into(), |value| format!("{value:.digits$}")));
+            row.insert(1, injected(name, one, truth.get(name)));
         }
         row
     };
@@ -34,8 +35,7 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
         let one = summary.derived.get(name)?;
         let mut row = cells(name, one);
         if let Some(truth) = truth {
-            let digits = decimals(one.sd);
-            row.insert(1, truth.get(name).map_or_else(|| NOTHING.into(), |value| format!("{value:.digits$}")));
+            row.insert(1, injected(name, one, truth.get(name)));
         }
         Some(row)
     });
@@ -76,15 +76,25 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
 }
 
 fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
-    let digits = decimals(one.sd);
-    let interval = |[low, high]: [f64; 2]| format!("{low:.digits$} to {high:.digits$}");
+    let shown = Shown::of(name, None, one.ci95[1]);
+    let digits = decimals(shown.factor * one.sd);
+    let interval = |ends: [f64; 2]| {
+        let [low, high] = ends.map(|end| shown.factor * end);
+        format!("{low:.digits$} to {high:.digits$}")
+    };
     vec![
-        label(name),
-        if one.unconstrained { "unconstrained".into() } else { format!("{:.digits$}", one.median) },
+        shown.label(),
+        if one.unconstrained { "unconstrained".into() } else { format!("{:.digits$}", shown.factor * one.median) },
         interval(one.ci68),
         interval(one.ci95),
         interval(one.hdi95),
     ]
+}
+
+/// An injected value with the digits of the others in its row.
+fn injected(name: &str, one: &ParameterSummary, value: Option<&f64>) -> String {
+    let shown = Shown::of(name, None, one.ci95[1]);
+    number(value.map(|value| shown.factor * value), decimals(shown.factor * one.sd))
 }
 
 /// How well the chain tells each parameter.
@@ -103,8 +113,12 @@ fn convergence_of(summary: &Summary) -> Table {
 fn warnings(manifest: &Manifest, summary: &RunSummary) -> Vec<String> {
     let measured = measured(manifest);
     let begun = manifest.warnings().into_iter().filter(|line| !measured.contains(line));
-    summary.remarks.iter().cloned().chain(begun).chain(manifest.co_rotation(summary)).collect()
+    let all = summary.remarks.iter().cloned().chain(begun).chain(manifest.co_rotation(summary));
+    all.filter(|line| !line.starts_with(BAYES)).collect()
 }
+
+/// How the line with Bayes factors begins, which is no warning.
+const BAYES: &str = "ln Bayes factor";
 
 /// What was taken from the observations, one line each.
 fn measured(manifest: &Manifest) -> Vec<String> {
@@ -130,18 +144,11 @@ fn period_modes(manifest: &Manifest, summary: &RunSummary) -> Table {
             rotation_period.map_or_else(|| NOTHING.into(), |p| days(p, mode)),
             format!("{:.digits$}", mode.porb_over_prot),
             format!("{low:.digits$} to {high:.digits$}"),
-            format!("{:.3}", mode.k_kms),
+            speed(mode.k_kms, 0.02 * mode.k_kms),
             mode.rotation.clone().unwrap_or_else(|| NOTHING.into()),
         ]
     };
-    let head = [
-        "share of the draws",
-        "period (d)",
-        "*P*_{orb}/*P*_{rot}",
-        "68 % interval",
-        "*K* (km/s)",
-        "period of the star",
-    ];
+    let head = ["share of the draws", "period (d)", "*P*_{orb}/*P*_{rot}", "68 % interval", "*K*", "rotation"];
     Table { head: head.map(String::from).to_vec(), rows: summary.period_modes.iter().map(row).collect() }
 }
 
@@ -167,8 +174,9 @@ fn meanings(summary: &Summary) -> impl Iterator<Item = String> {
 
 fn upper_limits(summary: &Summary) -> Vec<String> {
     let limit = |(name, one): (&String, &ParameterSummary)| {
-        let digits = decimals(one.sd);
-        Some(format!("{} < {:.digits$} (95 % upper limit).", label(name), one.upper95?))
+        let shown = Shown::of(name, None, one.ci95[1]);
+        let digits = decimals(shown.factor * one.sd);
+        Some(format!("{} < {:.digits$} (95 % upper limit).", shown.label(), shown.factor * one.upper95?))
     };
     summary.parameters.iter().chain(&summary.derived).filter_map(limit).collect()
 }

@@ -108,7 +108,9 @@ impl Kind {
         match self {
             Kind::Velocities => "Velocities of the maps",
             Kind::Spectra => "All line profiles",
+            Kind::Maps => "Parameters of the maps",
             Kind::Posterior => "Sampler diagnostics",
+            Kind::Limits => "Table of limits",
             _ => "More",
         }
     }
@@ -186,6 +188,8 @@ pub(super) fn sections(parts: Vec<Part>) -> Vec<Section> {
         }
     }
     for section in &mut sections {
+        // what was observed, before what a static map makes of it
+        section.figures.sort_by_key(|figure| figure.name.starts_with("changes"));
         // nothing is hidden behind nothing
         let is_bare = section.figures.is_empty() && section.tables.is_empty();
         if is_bare {
