@@ -4,7 +4,7 @@ use super::checks::{automatic, check_size, most, positive};
 use crate::data::config::error::Fault;
 use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use crate::star::{LimbDarkening, LocalLine, StarSettings};
+use crate::star::{LimbDarkening, LocalLine, Regions, StarSettings};
 use std::f64::consts::TAU;
 
 /// Lightest and heaviest star (solar masses).
@@ -32,6 +32,7 @@ pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<S
         limb_darkening: limb_darkening(&star.limb_darkening)?,
         contrast: contrast(star)?,
         line: local_line(&star.line, instrument)?,
+        regions: Regions::PLAIN,
     })
 }
 
