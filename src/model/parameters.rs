@@ -720,6 +720,16 @@ impl Parameter {
     /// Those of the field of spots that is integrated over.
     pub const FIELD: [Parameter; 3] = [Parameter::SpotAmplitude, Parameter::SpotSlope, Parameter::SpotLifetime];
 
+    /// Those of active regions.
+    pub const REGIONS: [Parameter; 6] = [
+        Parameter::RegionLineWidth,
+        Parameter::RegionEquivalentWidth,
+        Parameter::RegionShift,
+        Parameter::RegionArea,
+        Parameter::RegionAreaLimb,
+        Parameter::RegionDimmingLimb,
+    ];
+
     /// Its row of the table.
     pub const fn spec(self) -> &'static Spec {
         &PARAMETERS[self as usize]
