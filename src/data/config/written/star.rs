@@ -1,6 +1,6 @@
 //! `star` and `instrument` as users write them. Doc comments here are the descriptions of the JSON Schema.
 
-use super::number_or::EquivalentWidth;
+use super::number_or::{EquivalentWidth, OfStar};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +52,30 @@ pub struct Star<Period = f64> {
     pub contrast: Option<f64>,
     /// The line of one surface element.
     pub line: Line,
+    /// What differs in active regions beside their brightness. Fitted where it is not given, with objective
+    /// "marginal-likelihood"; otherwise spots are the photosphere, dimmed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub regions: Option<RegionsSection>,
+}
+
+/// What differs in active regions, spots with the plages around them, beside their brightness: their line, and how they
+/// look at the limb. `area`, `area_limb` and `dimming_limb` at 0 are spots that are the photosphere, dimmed.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RegionsSection {
+    /// Width of their line, before the spectrograph, over that of the photosphere's, 0.5 to 2.
+    pub line_width: OfStar,
+    /// Equivalent width of their line over that of the photosphere's, 0.3 to 3.
+    pub equivalent_width: OfStar,
+    /// Velocity of their line over that of the photosphere (km/s), positive to the red, -3 to 3.
+    pub shift_kms: OfStar,
+    /// Surface with their line per unit of the spots' filling factor, 0 to 20.
+    pub area: OfStar,
+    /// How much more of that surface there is at the limb: the change from the centre of the disc, -20 to 20.
+    pub area_limb: OfStar,
+    /// How much darker they are at the limb: the change of one minus their brightness from the centre of the disc, -3
+    /// to 3.
+    pub dimming_limb: OfStar,
 }
 
 /// Wavelength (nm) if none is given: that which LSD profiles of the visible are often normalised to.
