@@ -12,12 +12,12 @@ import tempfile
 import weakref
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core
+from . import _core, _plots
 from ._observations import Observations
 
 __all__ = ["Figure", "Maps", "Optimum", "Periodogram", "Plan", "Record", "Result", "Simulation"]
@@ -123,21 +123,77 @@ class Result:
         """Names of the figures that `figure` draws."""
         return _core.figure_names(os.fspath(self.folder))
 
-    def figure(self, name: str | None = None, *, dpi: float = 150.0) -> Figure:
-        """Draw a figure.
+    @overload
+    def figure(self, name: str | None = None, *, dpi: float = 150.0) -> Figure: ...
+
+    @overload
+    def figure(
+        self,
+        name: str | None = None,
+        *,
+        dpi: float = 150.0,
+        ax: Any = None,
+        width: float | None = None,
+        style: Any = None,
+    ) -> Any: ...
+
+    def figure(
+        self,
+        name: str | None = None,
+        *,
+        dpi: float = 150.0,
+        ax: Any = None,
+        width: float | None = None,
+        style: Any = None,
+    ) -> Any:
+        """Draw a figure: the program's own, or by matplotlib where `ax`, `width` or `style` is given.
 
         Parameters
         ----------
         name : str, optional
             One of `figures`; by default the first.
         dpi : float
-            Pixels of the PNG to the inch.
+            Pixels of the program's own PNG to the inch.
+        ax : matplotlib axes, sequence of them, or True
+            Where to draw, an axes for each panel; True for a new matplotlib figure.
+        width : float, optional
+            Width of a new matplotlib figure (inches).
+        style : str, dict or list, optional
+            Style of matplotlib, as `matplotlib.style.context` takes it.
 
         Returns
         -------
-        Figure
+        Figure, or matplotlib axes
+            Axes are an array of shape (rows, columns) where there are several.
+
+        Examples
+        --------
+        >>> axes = run.figure("corner", ax=True, width=6.0, style="ggplot")   # doctest: +SKIP
+        >>> axes[0, 0].figure.savefig("corner.pdf")                           # doctest: +SKIP
         """
-        return Figure(*_core.figure(os.fspath(self.folder), name, dpi))
+        if ax is None and width is None and style is None:
+            return Figure(*_core.figure(os.fspath(self.folder), name, dpi))
+        return _plots.draw(self, self.figures[0] if name is None else name, ax, width, style)
+
+    def figure_data(self, name: str | None = None) -> dict[str, NDArray[np.float64]]:
+        """The numbers behind a figure.
+
+        Parameters
+        ----------
+        name : str, optional
+            One of `figures`; by default the first.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray
+            Columns of the table that is drawn; pixels of maps, shape (maps, pixels); draws of the parameters.
+
+        Examples
+        --------
+        >>> run.figure_data("corner")["k_kms"].mean()                         # doctest: +SKIP
+        0.103
+        """
+        return _plots.arrays(self, self.figures[0] if name is None else name)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Copy all files into another folder, for the command line and others.

@@ -184,6 +184,30 @@ def test_figures(run: dimcmc.Run, tmp_path: Path) -> None:
         run.figure("map")
 
 
+def test_figures_by_matplotlib(run: dimcmc.Run) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    names = run.names
+    data = run.figure_data("corner")
+    assert list(data) == names and np.array_equal(data["k_kms"], run.samples["k_kms"])
+    assert run.figure_data("traces")["k_kms"].shape == run.log_prob.shape
+    axes = run.figure("corner", ax=True, width=5.0, style="ggplot")
+    assert axes.shape == (len(names), len(names)) and axes[0, 0].figure.get_figwidth() == 5.0
+    # on axes of one's own, which must be as many as there are panels
+    figure, own = plt.subplots(len(names), 1)
+    drawn = run.figure("traces", ax=own)
+    assert list(drawn[:, 0]) == list(own) and own[0].lines
+    with pytest.raises(ValueError, match=f"traces has {len(names)} panels, not 1"):
+        run.figure("traces", ax=figure.add_subplot())
+    with pytest.raises(KeyError, match="no figure map"):
+        run.figure_data("map")
+    with pytest.raises(ValueError, match="figure_data"):
+        run.figure("autocorrelation", ax=True)
+    plt.close("all")
+
+
 def test_results_survive_pickling(run: dimcmc.Run, simulation: dimcmc.Simulation, tmp_path: Path) -> None:
     again = pickle.loads(pickle.dumps(run))
     assert np.array_equal(again.chain, run.chain) and again.summary == run.summary and str(again) == str(run)
