@@ -26,13 +26,15 @@ fn main() {
     let t = Instant::now();
     let found = fit_star(imager, &plain, &known, &priors).unwrap();
     println!("coarse fitted {:.1} prior {:.1} {:.1?}", found.ln_evidence, found.ln_prior, t.elapsed());
-    for (p, sd) in priors.iter().zip(&found.sd) { println!("  {} {:.3} +- {:.3}", p.parameter.name(), found.values.get(p.parameter).unwrap(), sd); }
+    for (p, sd) in priors.iter().zip(&found.sd) {
+        println!("  {} {:.3} +- {:.3}", p.parameter.name(), found.values.get(p.parameter).unwrap(), sd);
+    }
     if args.len() > 2 {
         let basis = Basis::new(&imager.grid);
         for v in [values, found.values] {
-        let t = Instant::now();
-        let f = fit(imager, &basis, v, known, None).unwrap();
-        println!("full {:.1} {:?} {:.1?}", f.ln_evidence, f.marginal.assumed, t.elapsed());
+            let t = Instant::now();
+            let f = fit(imager, &basis, v, known, None).unwrap();
+            println!("full {:.1} {:?} {:.1?}", f.ln_evidence, f.marginal.assumed, t.elapsed());
         }
     }
 }

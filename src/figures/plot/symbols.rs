@@ -132,7 +132,7 @@ impl Title {
     /// Lines that a title has at most.
     pub const LINES: usize = 3;
 
-    /// A value with its error bars, downwards and upwards, of which `sigma` has two digits; none of them multiplied yet.
+    /// A value with its error bars, downwards and upwards, not yet multiplied; `sigma` has two digits.
     pub fn value(shown: &Shown, value: f64, [down, up]: [f64; 2], sigma: f64) -> Self {
         let digits = decimals(shown.factor * sigma);
         let [value, down, up] = [value, down, up].map(|x| format!("{:.digits$}", shown.factor * x));

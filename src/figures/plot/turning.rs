@@ -55,7 +55,10 @@ pub fn turning(folder: &Path) -> Result<Option<Value>, PlotError> {
     let state = file.parameters.state();
     let mut coarse: Vec<(&At, PixelMap)> = maps.iter().map(|map| (map, map.pixels.coarser(PIXELS))).collect();
     coarse.sort_by(|a, b| a.0.time_d.total_cmp(&b.0.time_d));
-    let of_one = |(at, pixels): &(&At, PixelMap)| json!({ "time": at.time_d, "epoch": at.epoch_d, "pixels": written(&pixels.values, scale) });
+    let of_one = |(at, pixels): &(&At, PixelMap)| {
+        let pixels = written(&pixels.values, scale);
+        json!({ "time": at.time_d, "epoch": at.epoch_d, "pixels": pixels })
+    };
     Ok(Some(json!({
         "inclination": state.inclination,
         "omega": TAU / file.rotation_period_d,

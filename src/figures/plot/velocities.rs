@@ -273,7 +273,7 @@ impl Curves<'_> {
         self.residual.draw(figure, &residuals, &phases, unit);
         residuals.frame(figure, Sides::BOTH);
         let digits = |sigma: Option<f64>| decimals(sigma.unwrap_or(f64::NAN));
-        let [k, ratio] = [speed(k_kms, self.sigma[0].unwrap_or(0.01 * k_kms)), {
+        let [k, ratio] = [speed(k_kms, self.sigma[0].unwrap_or(0.1 * k_kms)), {
             let digits = digits(self.sigma[1]);
             format!("{porb_over_prot:.digits$}")
         }];

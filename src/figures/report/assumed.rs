@@ -147,7 +147,9 @@ mod tests {
         let config = json!({
             "star": { "rotation_period_d": 2.741, "vsini_kms": 30.0, "inclination_deg": 55 },
             "imaging": { "objective": "marginal-likelihood", "chi2_target": 0.97 },
-            "parameters": { "vsini_kms": { "prior": "uniform", "min": 20, "max": 40.0 }, "phi": { "prior": "periodic" } }
+            "parameters": {
+                "vsini_kms": { "prior": "uniform", "min": 20, "max": 40.0 }, "phi": { "prior": "periodic" }
+            }
         });
         let fixed = fixed(&config).rows;
         assert!(fixed.contains(&vec!["rotation period".into(), "2.741 d".into()]), "{fixed:?}");

@@ -90,15 +90,11 @@ pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Resul
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn fit_star(
-    imager: &Imager,
-    near: &Fitted,
-    known: &Known,
-    priors: &[StarPrior],
-) -> Result<FittedStar, FieldError> {
+pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPrior]) -> Result<FittedStar, FieldError> {
     let assumed = near.marginal.assumed;
     let area = |prior: &&StarPrior| prior.parameter == Parameter::RegionArea;
-    let area = priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
+    let area =
+        priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
     let area = area.unwrap_or(1.0);
     let ends = |prior: &StarPrior| match prior.parameter {
         Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
@@ -108,7 +104,8 @@ pub fn fit_star(
     let basis = Basis::coarse(&imager.grid, DEGREE);
     let climb = Climb { imager, basis, known, priors, free: known.free(&assumed), limits };
     let of_star = priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
-    let place = DVector::from_iterator(OF_FIELD + priors.len(), place_of_field(&assumed).into_iter().copied().chain(of_star));
+    let place =
+        DVector::from_iterator(OF_FIELD + priors.len(), place_of_field(&assumed).into_iter().copied().chain(of_star));
     let first = climb.condensed_at(&place, &near.marginal, None)?;
     climb.up(first)
 }
@@ -154,12 +151,7 @@ impl Climb<'_> {
         self.condensed_at(place, near, Some(&near.design))
     }
 
-    fn condensed_at(
-        &self,
-        place: &DVector<f64>,
-        near: &Marginal,
-        like: Option<&Design>,
-    ) -> Result<Point, FieldError> {
+    fn condensed_at(&self, place: &DVector<f64>, near: &Marginal, like: Option<&Design>) -> Result<Point, FieldError> {
         let mut values = near.values;
         let numbers = self.numbers(place, &values);
         self.priors.iter().zip(&numbers).for_each(|(prior, x)| values.set(prior.parameter, *x));
@@ -277,7 +269,8 @@ impl Climb<'_> {
             bend.component_mul_assign(&(&scale * scale.transpose()));
             let pushes = |i: usize| {
                 let (low, high) = self.limits[i];
-                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0) || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
+                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
+                    || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
             };
             let moves: Vec<bool> = (0..count).map(|i| self.is_free(i) && !pushes(i)).collect();
             let among = DMatrix::from_fn(count, count, |i, j| match i == j {
@@ -290,7 +283,12 @@ impl Climb<'_> {
             let Some(mut way) = factor.map(|factor| factor.solve(&inside)) else { break };
             let hoped = 0.5 * inside.dot(&way);
             if std::env::var("DIMCMC_TRACE").is_ok() {
-                eprintln!("{step} height {:.2} hoped {hoped:.2} place {:.3?} gradient {:.2?}", here.height, here.place.as_slice(), gradient.as_slice());
+                eprintln!(
+                    "{step} height {:.2} hoped {hoped:.2} place {:.3?} gradient {:.2?}",
+                    here.height,
+                    here.place.as_slice(),
+                    gradient.as_slice()
+                );
             }
             if hoped < GAIN {
                 break;
@@ -319,7 +317,8 @@ impl Climb<'_> {
         };
         let of_star = (OF_FIELD, self.priors.len());
         let jacobian = self.jacobian(&here);
-        let covariance = &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
+        let covariance =
+            &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
         let sd = covariance.diagonal().map(f64::sqrt);
         let numbers = self.numbers(&here.place, &here.marginal.values);
         let ln_prior = self.ln_prior(&numbers);
