@@ -1,6 +1,6 @@
 //! `dimcmc grid`: the landscape and its paraboloid.
 
-use super::output::{Output, fitted, remarks, scene};
+use super::output::{fitted, Output, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};

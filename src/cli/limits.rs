@@ -1,6 +1,6 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
-use super::output::{Output, fitted, remarks, scene};
+use super::output::{fitted, Output, remarks, scene};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::config::Config;

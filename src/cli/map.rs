@@ -1,6 +1,6 @@
 //! `dimcmc map`: one reconstruction at the config's parameter values.
 
-use super::output::{Output, fitted, scene};
+use super::output::{fitted, Output, scene};
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
 use crate::data::config::Config;

@@ -1,6 +1,6 @@
 //! `dimcmc optimise`: the best parameters and their curvature.
 
-use super::output::{Output, fitted, remarks, scene};
+use super::output::{fitted, Output, remarks, scene};
 use super::search::search;
 use super::{Failure, Global, console};
 use crate::data::config::Config;

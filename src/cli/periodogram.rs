@@ -1,6 +1,6 @@
 //! `dimcmc periodogram`: the blind search for a planet.
 
-use super::output::{Output, fitted, scene};
+use super::output::{fitted, Output, scene};
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;

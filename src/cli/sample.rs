@@ -1,6 +1,6 @@
 //! `dimcmc sample`: the ensemble chain.
 
-use super::output::{Output, fitted, remarks, scene};
+use super::output::{fitted, Output, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, console, progress};

@@ -633,7 +633,10 @@ pub const PARAMETERS: [Spec; 32] = [
         about: "Surface with the line of active regions per unit of the spots' filling factor.",
         config_key: "star.regions.area",
         priors: &[Uniform, Normal],
-        role: Role::Surface(|surface| surface.region_area.as_ref(), |surface, x| surface.region_area = Some(x)),
+        role: Role::Surface(
+            |surface| surface.region_area.as_ref(),
+            |surface, x| surface.region_area = Some(x),
+        ),
         ..region((0.0, 20.0), 0.0)
     },
     Spec {

@@ -52,10 +52,31 @@ pub struct Star<Period = f64> {
     pub contrast: Option<f64>,
     /// The line of one surface element.
     pub line: Line,
+    /// Numbers of the star that are fitted to the profiles before maps and searches, with objective
+    /// "marginal-likelihood", beginning from their values here: of "line_sigma_kms", "equivalent_width_kms",
+    /// "vsini_kms" and "limb_darkening" any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted: Vec<String>,
+    /// A drift of the velocities, integrated out with objective "marginal-likelihood": an outer companion, or the
+    /// spectrograph. "linear" where it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_drift: Option<VelocityDrift>,
     /// What differs in active regions beside their brightness. Fitted where it is not given, with objective
     /// "marginal-likelihood"; otherwise spots are the photosphere, dimmed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub regions: Option<RegionsSection>,
+}
+
+/// A drift of the velocities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum VelocityDrift {
+    /// No drift.
+    None,
+    /// In proportion to time.
+    Linear,
+    /// With a curvature.
+    Quadratic,
 }
 
 /// What differs in active regions, spots with the plages around them, beside their brightness: their line, and how they
