@@ -236,7 +236,7 @@ fn markup(text: &str) -> String {
     if text.matches('*').count() % 2 == 1 {
         return escape(&plain(text));
     }
-    let has_code = text.matches('`').count() % 2 == 0;
+    let has_code = text.matches('`').count().is_multiple_of(2);
     let mut html = String::new();
     let (mut italic, mut script, mut code) = (false, None, false);
     let mut characters = text.chars().peekable();
