@@ -19,7 +19,7 @@ __all__ = ["Config", "Section"]
 class Section(Mapping[str, Any]):
     """A section of a `Config`, such as ``config.star``: a live view.
 
-    Keys are attributes and items. Reading gives the program's default where the config says nothing; writing checks
+    Keys are attributes and items. Missing keys read as the program's default; writing checks
     the whole config and leaves it as it was if it makes no sense.
     """
 

@@ -40,10 +40,10 @@ pub fn remarks(scene: &Scene) {
 /// Options of every command that writes.
 #[derive(Debug, clap::Args)]
 pub struct Output {
-    /// Folder for the results; created if need be, must be empty
+    /// Folder for the results; created if needed, must be empty
     #[arg(long = "out", value_name = "DIR")]
     folder: PathBuf,
-    /// Write into the folder even if it is not empty; files of the same names are replaced
+    /// Write into a non-empty folder; files of the same names are replaced
     #[arg(long)]
     force: bool,
 }
@@ -137,7 +137,7 @@ pub struct ConfigFile {
     /// Config to write
     #[arg(long = "out", value_name = "FILE", default_value = "star.json")]
     path: PathBuf,
-    /// Replace the file if it is there
+    /// Replace an existing file
     #[arg(long)]
     force: bool,
 }

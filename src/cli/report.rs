@@ -8,8 +8,7 @@ use std::path::PathBuf;
 
 /// Write one HTML page of the results in FOLDER
 ///
-/// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing
-/// else and can be sent to others.
+/// Verdict, tables, notes, figures, config and citation in a single self-contained file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report runs/demo --out demo.html")]
 pub struct Args {
@@ -18,7 +17,7 @@ pub struct Args {
     /// The file; `report.html` in FOLDER if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the file if it is there
+    /// Replace an existing file
     #[arg(long)]
     force: bool,
 }

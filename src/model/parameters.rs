@@ -59,7 +59,7 @@ pub enum Parameter {
     EquivalentWidth,
     /// Brightness of a spot over that of the photosphere.
     Contrast,
-    /// Standard deviation of the spots' filling factor before the data, where maps are integrated over.
+    /// Prior standard deviation of the spot filling factor, where maps are integrated over.
     SpotAmplitude,
     /// Slope of the spots' spectrum there.
     SpotSlope,
@@ -315,8 +315,8 @@ pub const PARAMETERS: [Spec; 26] = [
         latex: r"T_\mathrm{conj}",
         symbol: "*T*_{conj}",
         about: "Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in \
-                place of `phi`.\nA normal prior is an ephemeris: at the time of the data it must tell the phase to a \
-                tenth of an orbit.",
+                place of `phi`.\nA normal prior is an ephemeris: at the time of the data its phase must be known to \
+                a tenth of an orbit.",
         config_key: "planet.t_conjunction_d",
         about_value: "Time of an inferior conjunction (planet in front; d, on the time scale of the observations), in \
                       place of `phi`.",
@@ -534,8 +534,8 @@ pub const PARAMETERS: [Spec; 26] = [
         unit: "km/s",
         latex: r"W_\mathrm{line}",
         symbol: "*W*_{line}",
-        about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a \
-                nuisance of\neach profile's own by the priors alone.",
+        about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, distinguished from \
+        a nuisance per\nprofile by the priors alone.",
         config_key: "star.line.equivalent_width_kms",
         most: most::VELOCITY_KMS,
         step: Step::Relative(2e-3),
@@ -551,8 +551,8 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "contrast",
         latex: "c",
         symbol: "*c*",
-        about: "Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter \
-                than some\nvalue: the darker they are, the fewer a map needs, so that a flat prior ends at 0.",
+        about: "Brightness of a spot over that of the photosphere, 0 to 1. The data give an upper limit only: \
+        darker spots\ncover less area, so that a flat prior ends at 0.",
         config_key: "star.contrast",
         values: (Bound::Included(0.0), Bound::Excluded(1.0)),
         widest: (0.0, 1.0),
@@ -565,7 +565,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "spot_amplitude",
         latex: r"\sigma_\mathrm{spot}",
         symbol: "*σ*_{spot}",
-        about: "Standard deviation of the spots' filling factor before the data, with objective \
+        about: "Prior standard deviation of the spot filling factor, with objective \
                 \"marginal-likelihood\".",
         config_key: "imaging.spot_amplitude",
         scale: Scale::Logarithmic,
@@ -577,7 +577,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "spot_slope",
         latex: r"\alpha_\mathrm{spot}",
         symbol: "*α*_{spot}",
-        about: "How fast the spots' power falls with the degree of the harmonics, with objective \
+        about: "Power-law index of the angular power spectrum of the spots, with objective \
                 \"marginal-likelihood\".",
         config_key: "imaging.spot_slope",
         role: Role::Field(|field| Some(&field.slope), |field, x| field.slope = x),
@@ -589,7 +589,7 @@ pub const PARAMETERS: [Spec; 26] = [
         unit: "d",
         latex: r"\tau_\mathrm{spot}",
         symbol: "*τ*_{spot}",
-        about: "How long spots live (d), with objective \"marginal-likelihood\".",
+        about: "Spot lifetime (d), with objective \"marginal-likelihood\".",
         config_key: "imaging.spot_lifetime_d",
         scale: Scale::Logarithmic,
         step: Step::Fixed(0.1),

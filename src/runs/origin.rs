@@ -77,7 +77,7 @@ const KINDS: [(&str, &str); 10] = [
 fn instead(folder: &Path) -> String {
     match KINDS.iter().find(|(file, _)| folder.join(file).is_file()) {
         Some((file, command)) => format!("this folder is of `dimcmc {command}` ({file} is there)"),
-        None => "nothing was begun in this folder, or it ended before its first result".to_owned(),
+        None => "this folder holds no results yet".to_owned(),
     }
 }
 
@@ -120,7 +120,7 @@ pub enum OriginError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// Config or data are not those that it was begun with.
-    #[error("{}: {what} since this run began; begin another run for it", .folder.display())]
+    #[error("{}: {what} since this run began; start a new run", .folder.display())]
     Changed {
         /// The folder.
         folder: PathBuf,

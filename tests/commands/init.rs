@@ -256,14 +256,7 @@ fn a_map_that_does_not_fit_says_why() {
     config["star"]["line"]["sigma_kms"] = json!(2.5);
     desk.write("star.json", &config.to_string());
     let table = desk.succeed(&["map", "star.json", "--out", "map"]);
-    says(
-        &table,
-        &[
-            "warning",
-            "vsini is the likely reason: with star.vsini_kms = 2",
-            "instead of 21 a map comes down to chi2 = ",
-        ],
-    );
+    says(&table, &["warning", "likely cause: vsini; with star.vsini_kms = 2", "instead of 21 a map reaches chi2/N = "]);
     let diagnosis = desk.json("map/fit.json")["diagnosis"].clone();
     assert_eq!(diagnosis["reason"], "vsini");
     let [before, after] = ["/chi2_per_datum", "/chi2_per_datum_changed"].map(|key| number(&diagnosis, key));
@@ -274,7 +267,7 @@ fn a_map_that_does_not_fit_says_why() {
         &desk.refusal(&["map", "star.json", "--out", "other"]),
         &[
             "imaging.chi2_target: the target chi2 of 0.9700 per datum is below",
-            "; vsini is the likely reason: with star.vsini_kms = 2",
+            "; likely cause: vsini; with star.vsini_kms = 2",
         ],
     );
 }
@@ -305,7 +298,7 @@ fn what_map_would_refuse_is_refused_with_the_reason() {
         &message,
         &[
             "data/observations.txt: `map` would find no maps of these profiles (amplitude-at-bound): ",
-            "the width of the local line is the likely reason: with star.line.sigma_kms = ",
+            "likely cause: the width of the local line; with star.line.sigma_kms = ",
         ],
     );
     assert!(!desk.path("star.json").exists());

@@ -26,7 +26,7 @@ pub(super) fn sigma_kms(look: &FirstLook, line: LineModel, known: &Known, ledger
         true => (
             Source::Assumed,
             format!(
-                "+- {error:.1}: the flanks hardly tell it from vsini, a usual {} counts too; --line-sigma",
+                "+- {error:.1}: hardly distinguished from vsini, default {} as a prior; --line-sigma",
                 line.sigma_kms
             ),
         ),

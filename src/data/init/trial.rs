@@ -323,7 +323,7 @@ fn search(
 
 /// A static map in words.
 fn spotted(spottedness: f64, draft: &Draft, orbit: bool) -> String {
-    let orbit = if orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
+    let orbit = if orbit { ", but only with an orbit: run `periodogram`" } else { "" };
     let (percent, spots) = (100.0 * spottedness, draft.imaging.brightness() == BrightnessModel::Spots);
     let many = match spots && spottedness > MANY_SPOTS {
         true => "; that is a lot: are vsini, inclination and line right?",
@@ -360,7 +360,7 @@ impl Trial {
             (End::Fits(maps), Some(diagnosis)) => {
                 let larger =
                     self.errors.iter().flatten().find_map(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
-                        format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
+                        format!("; without it \"auto\" makes the errors {misfit:.1} times those of the continuum")
                     });
                 format!("test fit: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
             }

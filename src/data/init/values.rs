@@ -372,7 +372,7 @@ impl Values {
         });
         let few = (profiles < FEWEST_FOR_AN_ORBIT).then(|| {
             format!(
-                "{profiles} profiles make a map, and show no orbit: `periodogram` and `sample` take \
+                "{profiles} profiles suffice for a map, not for an orbit: `periodogram` and `sample` take \
                 {FEWEST_FOR_AN_ORBIT} or more"
             )
         });

@@ -138,7 +138,7 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
     let values = sorted(1);
     let median = values[values.len() / 2];
     if columns.brightness == Brightness::Magnitude {
-        remarks.push(format!("magnitudes, made fluxes in units of that at {median:.3} mag"));
+        remarks.push(format!("magnitudes, converted to fluxes in units of that at {median:.3} mag"));
         rows.iter_mut().for_each(|row| *row = flux_of(*row, median));
     } else if !columns.has_unit {
         let span = values[values.len() * 19 / 20] - values[values.len() / 20];

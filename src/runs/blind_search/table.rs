@@ -26,8 +26,8 @@ impl PeriodogramFile {
         if let Some(ConstantVelocity { value_kms, sigma_kms }) = self.systemic_velocity {
             let digits = decimals(sigma_kms);
             text += &format!(
-                "systemic velocity: {value_kms:.digits$} +- {sigma_kms:.digits$} km/s, from which rv_kms counts; \
-                rv_sigma_kms does not include its error\n"
+                "systemic velocity: {value_kms:.digits$} ± {sigma_kms:.digits$} km/s, subtracted from rv_kms (its \
+                uncertainty is not in rv_sigma_kms)\n"
             );
         }
         text += &format!("{}\n", chance(&self.false_alarm));
@@ -123,7 +123,7 @@ fn meanings(found: &QuantitiesRecord) -> String {
 fn eccentric(orbit: &KeplerianRecord) -> String {
     let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" +- {x:.digits$}"));
     let mut text = format!(
-        "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circle\n",
+        "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circular orbit\n",
         orbit.eccentricity,
         error(orbit.sigma_eccentricity, 3),
         orbit.omega_deg,

@@ -65,7 +65,7 @@ pub trait Word: Copy + PartialEq + 'static {
 impl Word for Auto {
     const WORDS: &'static [(&'static str, Self)] = &[("auto", Auto)];
     const EXPECTED: &'static str = "a number or \"auto\"";
-    const SCHEMA: [&'static str; 2] = ["Automatic", "A number above 0, or \"auto\": what the observations say."];
+    const SCHEMA: [&'static str; 2] = ["Automatic", "A number above 0, or \"auto\": measured on the observations."];
 
     fn bounds() -> Value {
         json!({ "exclusiveMinimum": 0 })
@@ -76,7 +76,7 @@ impl Word for FittedJitter {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedJitter)];
     const EXPECTED: &'static str = "a number or \"fitted\"";
     const SCHEMA: [&'static str; 2] =
-        ["VelocityJitter", "A number from 0 to 100 (km/s), or \"fitted\": what the profiles say."];
+        ["VelocityJitter", "A number from 0 to 100 (km/s), or \"fitted\": fitted to the profiles."];
 
     fn bounds() -> Value {
         json!({ "minimum": 0, "maximum": 100 })
@@ -86,7 +86,11 @@ impl Word for FittedJitter {
 impl Word for FittedOffset {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedOffset)];
     const EXPECTED: &'static str = "a number or \"fitted\"";
-    const SCHEMA: [&'static str; 2] = ["ZeroPoint", "A number from -100 to 100 (km/s), or \"fitted\": integrated out."];
+    const SCHEMA: [&'static str; 2] = [
+        "ZeroPoint",
+        "A number from -100 to 100 (km/s), or \"fitted\": marginalised \
+    over.",
+    ];
 
     fn bounds() -> Value {
         json!({ "minimum": -100, "maximum": 100 })
@@ -98,8 +102,7 @@ impl Word for OfField {
     const EXPECTED: &'static str = "a number, \"fitted\", or (a lifetime) \"static\"";
     const SCHEMA: [&'static str; 2] = [
         "Hyperparameter",
-        "A number, or \"fitted\": that for which the profiles are most probable. A lifetime may be \"static\" too: \
-         spots do not change.",
+        "A number, or \"fitted\": at the maximum of the marginal likelihood. A lifetime may be \"static\", too.",
     ];
 
     fn bounds() -> Value {

@@ -28,8 +28,8 @@ pub struct Star<Period = f64> {
     /// Differential rotation: angular velocity of the equator minus that of the pole (rad/d).
     #[serde(default)]
     pub domega_rad_d: f64,
-    /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It
-    /// decides nothing else, and may be added to a run that is there; but two planets must be stable by it.
+    /// Mass of the star (solar masses), 0.01 to 200, for the minimum mass M sin i of the planet. It may be added to an
+    /// existing run. Two planets must be stable for this mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass_msun: Option<f64>,
     /// Limb darkening; linear with coefficient 0.65 if not given.
