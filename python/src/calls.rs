@@ -25,7 +25,7 @@ fn with_scene(
 ) -> PyResult<String> {
     attend(py, threads, progress, move |job| {
         job.say("profiles");
-        let scene = source.scene(None)?;
+        let scene = source.scene(None)?.fitted(&|what| job.say(what));
         work(job, &scene, &out)
     })
 }

@@ -38,6 +38,8 @@ impl LogPosterior {
                 return Ok(dimcmc::LogPosterior::again(&scene, &origin, scene.path()).map_err(failed)?);
             }
             scene.require_free()?;
+            let scene = scene.fitted(&|what| job.say(what));
+            let failed = |error| Failure::run(scene.path(), error);
             let found = scene.optimise_with(&|progress| job.search(progress));
             let found = found.map_err(|e| Failure::search(scene.path(), e))?;
             job.say("places where evaluations start");

@@ -71,6 +71,7 @@ pub fn sample(
 /// A run in memory, with its walkers where they start.
 fn begin(job: &crate::job::Job, scene: &Scene, beginning: Beginning, pool: &Pool) -> Result<Run, Fault> {
     scene.require_free()?;
+    let scene = &scene.clone().fitted(&|what| job.say(what));
     let found = scene.optimise_with(&|progress| job.search(progress));
     let found = found.map_err(|e| Failure::search(scene.path(), e))?;
     job.say("start of the walkers, blind search");

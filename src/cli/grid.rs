@@ -1,6 +1,6 @@
 //! `dimcmc grid`: the landscape and its paraboloid.
 
-use super::output::{Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
@@ -64,6 +64,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         spinner.finish_and_clear();
         scan.map_err(failed)?
     } else {
+        let scene = fitted(global, scene.clone());
         let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
         signals.defer();
         let folder = args.output.create()?;

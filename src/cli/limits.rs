@@ -1,6 +1,6 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
-use super::output::{Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::config::Config;
@@ -87,6 +87,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| [CSV, JSON].contains(&name))?;
     remarks(&scene);
+    let scene = fitted(global, scene);
     let settings = settings(args, &scene)?;
     let spinner = progress::bar(global, None, "planet-free map");
     let shortcut =

@@ -1,6 +1,6 @@
 //! `dimcmc map`: one reconstruction at the config's parameter values.
 
-use super::output::{Output, scene};
+use super::output::{Output, fitted, scene};
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
 use crate::data::config::Config;
@@ -33,6 +33,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name) || name == LIGHT_CURVES)?;
+    let scene = fitted(global, scene);
     let spinner = progress::bar(global, None, "reconstructing");
     let maps = Maps::of(&scene, args.times.as_deref(), &|what| spinner.set_message(what));
     spinner.finish_and_clear();

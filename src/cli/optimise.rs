@@ -1,6 +1,6 @@
 //! `dimcmc optimise`: the best parameters and their curvature.
 
-use super::output::{Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
 use super::{Failure, Global, console};
 use crate::data::config::Config;
@@ -27,6 +27,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.spare(&scene.files(), |name| name == optimum::FILE)?;
     remarks(&scene);
     scene.settings.require_free()?;
+    let scene = fitted(global, scene);
     let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);
     let folder = args.output.create()?;

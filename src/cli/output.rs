@@ -3,7 +3,7 @@
 //! It is checked before anything is computed and created once there is something to write, so that bad input leaves
 //! nothing behind.
 
-use super::{Failure, console};
+use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
 use crate::runs::{grid_scan, run};
@@ -14,6 +14,14 @@ use std::path::{Path, PathBuf};
 pub fn scene(config: &Config) -> Result<Scene, SceneError> {
     note_objective(std::slice::from_ref(config));
     Scene::new(config)
+}
+
+/// The same with numbers of the star that the config leaves to the profiles.
+pub fn fitted(global: &Global, scene: Scene) -> Scene {
+    let spinner = progress::bar(global, None, "profiles");
+    let scene = scene.fitted(&|what| spinner.set_message(what.to_owned()));
+    spinner.finish_and_clear();
+    scene
 }
 
 /// Says on standard error which objective configs that name none have; of several, by the first of them.

@@ -1,6 +1,6 @@
 //! `dimcmc periodogram`: the blind search for a planet.
 
-use super::output::{Output, scene};
+use super::output::{Output, fitted, scene};
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;
@@ -58,6 +58,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
+    let scene = fitted(global, scene);
     let spinner = progress::bar(global, None, "reconstructing");
     let found = BlindSearch::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));
     let found = found.map_err(|error| {

@@ -1,6 +1,6 @@
 //! `dimcmc sample`: the ensemble chain.
 
-use super::output::{Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, console, progress};
@@ -86,6 +86,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             Start::Optimum => StartFrom::Optimum,
             Start::Prior => StartFrom::Prior,
         };
+        let scene = fitted(global, scene.clone());
         let found = search(global, &args.config, &scene, &scene.space)?;
         let spinner = progress::bar(global, None, "start of the walkers");
         args.output.check()?;

@@ -14,6 +14,7 @@ use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
+use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, NoMaps, SurfaceMaps, SurfaceSettings};
@@ -108,6 +109,34 @@ impl Scene {
         Scene { settings, data, observations, data_sha256: sha256, truth, measured, chi2_target, imager, space }
     }
 
+    /// The same with numbers of the star that the config leaves to the profiles; `report` is told what is under way.
+    /// Where the profiles have no fit they stay as they are, and what asks for maps says why.
+    #[must_use]
+    pub fn fitted(self, report: &dyn Fn(&str)) -> Self {
+        let fitted = &self.settings.fitted;
+        if fitted.is_empty() || self.measured.star.is_some() {
+            return self;
+        }
+        report("fitting active regions");
+        let known = self.settings.known_field();
+        match MeasuredStar::of(&self.imager, self.settings.values, known, fitted) {
+            Ok(star) => self.with_star(star),
+            Err(_) => self,
+        }
+    }
+
+    /// The same with numbers of the star as they were measured.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn with_star(mut self, star: MeasuredStar) -> Self {
+        star.put_into(&mut self.imager.star);
+        let is_free = |parameter| self.settings.free.iter().any(|free| free.parameter == parameter);
+        star.set(&mut self.settings.values, is_free);
+        self.space = space(&self.settings.free, &self.settings, &self.imager);
+        self.measured.star = Some(star);
+        self
+    }
+
     /// The same star with `orbits` put into its profiles: into whole ones, resampled and cut again. Errors stay, and so
     /// does all that was measured.
     ///
@@ -127,7 +156,12 @@ impl Scene {
         let (measured, imager) = (measured.clone(), imager.clone());
         let sha256 = self.data_sha256.clone();
         let before = Calibrated { observations, sha256, measured, chi2_target: *chi2_target, imager };
-        Ok(Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?))
+        let star = self.measured.star.clone();
+        let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?);
+        Ok(match star {
+            Some(star) => scene.with_star(star),
+            None => scene,
+        })
     }
 
     /// The config file, or what stands for it: what errors name.

@@ -131,7 +131,9 @@ impl Simulation {
             let flux = |(k, time_d): (usize, &f64)| {
                 let map = changing.as_ref().map_or(still.column(0), |maps| maps.column(k));
                 let shares = band.shares(&grid, star, &state, &[*time_d]);
-                shares.iter().zip(&map).map(|(share, brightness)| share * brightness).sum::<f64>()
+                let flux = shares.iter().zip(&map).map(|(share, brightness)| share * brightness).sum::<f64>();
+                // spots that are darker at the limb: what shares add up to is not 1
+                if star.regions.are_plain() { flux } else { flux + 1.0 - shares.iter().sum::<f64>() }
             };
             fluxes.par_extend(times_d.par_iter().enumerate().map(flux));
         }

@@ -59,6 +59,18 @@ pub enum Parameter {
     EquivalentWidth,
     /// Brightness of a spot over that of the photosphere.
     Contrast,
+    /// Width of the line of active regions, before the spectrograph, over that of the photosphere's.
+    RegionLineWidth,
+    /// Its equivalent width over that of the photosphere's.
+    RegionEquivalentWidth,
+    /// Its velocity (km/s) over that of the photosphere.
+    RegionShift,
+    /// Surface with this line per unit of the spots' filling factor.
+    RegionArea,
+    /// How much more of it there is at the limb.
+    RegionAreaLimb,
+    /// How much darker spots, with all that is around them, are at the limb.
+    RegionDimmingLimb,
     /// Prior standard deviation of the spot filling factor, where maps are integrated over.
     SpotAmplitude,
     /// Slope of the spots' spectrum there.
@@ -248,6 +260,18 @@ const SHAPE: Spec = Spec {
     ..PLAIN
 };
 
+/// A number of active regions that may lie within these bounds, and is this of spots that are the photosphere, dimmed.
+const fn region(bounds: (f64, f64), plain: f64) -> Spec {
+    Spec {
+        values: from_to(bounds),
+        widest: bounds,
+        usual: Some(plain),
+        step: Step::Fixed(0.05),
+        difference: Step::Fixed(0.02),
+        ..PLAIN
+    }
+}
+
 /// A number of the field that may lie within these bounds.
 const fn field(bounds: (f64, f64), usual: f64, usual_prior: PriorKind) -> Spec {
     Spec {
@@ -261,7 +285,7 @@ const fn field(bounds: (f64, f64), usual: f64, usual_prior: PriorKind) -> Spec {
 }
 
 /// All parameters, in the order of [`Parameter`], of every table and chain.
-pub const PARAMETERS: [Spec; 26] = [
+pub const PARAMETERS: [Spec; 32] = [
     Spec {
         parameter: Parameter::K,
         key: "k_kms",
@@ -561,6 +585,86 @@ pub const PARAMETERS: [Spec; 26] = [
         ..PLAIN
     },
     Spec {
+        parameter: Parameter::RegionLineWidth,
+        key: "region_line_width",
+        latex: r"w_\mathrm{r}",
+        symbol: "*w*_{r}",
+        about: "Width of the line of active regions, before the spectrograph, over that of the photosphere's.",
+        config_key: "star.regions.line_width",
+        role: Role::Surface(
+            |surface| surface.region_line_width.as_ref(),
+            |surface, x| surface.region_line_width = Some(x),
+        ),
+        ..region((0.5, 2.0), 1.0)
+    },
+    Spec {
+        parameter: Parameter::RegionEquivalentWidth,
+        key: "region_equivalent_width",
+        latex: r"W_\mathrm{r}/W",
+        symbol: "*W*_{r}/*W*",
+        about: "Equivalent width of the line of active regions over that of the photosphere's.",
+        config_key: "star.regions.equivalent_width",
+        role: Role::Surface(
+            |surface| surface.region_equivalent_width.as_ref(),
+            |surface, x| surface.region_equivalent_width = Some(x),
+        ),
+        ..region((0.3, 3.0), 1.0)
+    },
+    Spec {
+        parameter: Parameter::RegionShift,
+        key: "region_shift_kms",
+        unit: "km/s",
+        latex: r"v_\mathrm{r}",
+        symbol: "*v*_{r}",
+        about: "Velocity of the line of active regions over that of the photosphere (km/s), positive to the red.",
+        config_key: "star.regions.shift_kms",
+        priors: &[Uniform, Normal],
+        role: Role::Surface(
+            |surface| surface.region_shift_kms.as_ref(),
+            |surface, x| surface.region_shift_kms = Some(x),
+        ),
+        ..region((-3.0, 3.0), 0.0)
+    },
+    Spec {
+        parameter: Parameter::RegionArea,
+        key: "region_area",
+        latex: r"F",
+        symbol: "*F*",
+        about: "Surface with the line of active regions per unit spot filling factor.",
+        config_key: "star.regions.area",
+        priors: &[Uniform, Normal],
+        role: Role::Surface(|surface| surface.region_area.as_ref(), |surface, x| surface.region_area = Some(x)),
+        ..region((0.0, 20.0), 0.0)
+    },
+    Spec {
+        parameter: Parameter::RegionAreaLimb,
+        key: "region_area_limb",
+        latex: r"F_1",
+        symbol: "*F*_{1}",
+        about: "Increase of that surface towards the limb: limb minus disc centre.",
+        config_key: "star.regions.area_limb",
+        priors: &[Uniform, Normal],
+        role: Role::Surface(
+            |surface| surface.region_area_limb.as_ref(),
+            |surface, x| surface.region_area_limb = Some(x),
+        ),
+        ..region((-20.0, 20.0), 0.0)
+    },
+    Spec {
+        parameter: Parameter::RegionDimmingLimb,
+        key: "region_dimming_limb",
+        latex: r"q_1",
+        symbol: "*q*_{1}",
+        about: "Limb dimming of active regions: one minus their brightness, limb minus disc centre.",
+        config_key: "star.regions.dimming_limb",
+        priors: &[Uniform, Normal],
+        role: Role::Surface(
+            |surface| surface.region_dimming_limb.as_ref(),
+            |surface, x| surface.region_dimming_limb = Some(x),
+        ),
+        ..region((-3.0, 3.0), 0.0)
+    },
+    Spec {
         parameter: Parameter::SpotAmplitude,
         key: "spot_amplitude",
         latex: r"\sigma_\mathrm{spot}",
@@ -612,6 +716,16 @@ impl Parameter {
 
     /// Those of the field of spots that is integrated over.
     pub const FIELD: [Parameter; 3] = [Parameter::SpotAmplitude, Parameter::SpotSlope, Parameter::SpotLifetime];
+
+    /// Those of active regions.
+    pub const REGIONS: [Parameter; 6] = [
+        Parameter::RegionLineWidth,
+        Parameter::RegionEquivalentWidth,
+        Parameter::RegionShift,
+        Parameter::RegionArea,
+        Parameter::RegionAreaLimb,
+        Parameter::RegionDimmingLimb,
+    ];
 
     /// Its row of the table.
     pub const fn spec(self) -> &'static Spec {

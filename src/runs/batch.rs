@@ -96,7 +96,7 @@ pub fn sample(star: &Star, pool: &Pool) -> End {
 }
 
 fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
-    let scene = Scene::load(&star.config)?;
+    let mut scene = Scene::load(&star.config)?;
     scene.settings.require_free()?;
     let folder = &star.folder;
     // a chain without a line is one that was killed as it began
@@ -110,6 +110,7 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
         }
         Run::resume(&scene, folder, None, pool)?
     } else {
+        scene = scene.fitted(&|_| ());
         let settings = scene.search_settings();
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
         Run::in_memory(&scene, found, StartFrom::Optimum, pool)?.kept_in(folder, true)?

@@ -48,6 +48,8 @@ pub struct Observed<'a> {
     pub state: &'a StarState,
     /// Limb darkening.
     pub limb: LimbDarkening,
+    /// Whether pixels are weighted by `1 - mu`, too.
+    pub limb_alone: bool,
     /// Times of the observations since the star's epoch (d).
     pub since_epoch_d: Vec<f64>,
     /// Step (km/s) of the velocity grid that its line takes.
@@ -63,7 +65,7 @@ impl Deposit {
     /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are
     /// to be seen again.
     fn sorted(star: &Observed, margin: f64, again: bool) -> (Self, Option<Source>) {
-        let &Observed { grid, state, limb, ref since_epoch_d, step_kms } = star;
+        let &Observed { grid, state, limb, limb_alone, ref since_epoch_d, step_kms } = star;
         // what is said of pixels below holds for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
         let order = match grid.len() {
@@ -71,7 +73,7 @@ impl Deposit {
             pixels if pixels <= LARGE_MAP => Order::ByVelocity,
             _ => Order::OneByOne,
         };
-        let viewer = Viewer::new(state, limb, step_kms);
+        let viewer = Viewer::new(state, limb, limb_alone, step_kms);
         let sight = viewer.sight(grid, margin);
         let reach = reach(&viewer);
         let nodes = 2 * reach as usize + 1;
@@ -87,7 +89,7 @@ impl Deposit {
 
     /// Number of nodes in steps of `step_kms` that a state takes.
     pub fn nodes_at(state: &StarState, limb: LimbDarkening, step_kms: f64) -> f64 {
-        2.0 * reach(&Viewer::new(state, limb, step_kms)) + 1.0
+        2.0 * reach(&Viewer::new(state, limb, false, step_kms)) + 1.0
     }
 
     /// Number of visible (pixel, observation) pairs.
@@ -148,9 +150,9 @@ impl Arranged {
     /// Deposits of the same pixels as those of another star are seen at the same times, on the same grid.
     pub fn deposit(&self, star: &Observed) -> Deposit {
         let &Arranged { step_kms, nodes, pixels, ref arrangement, ref source } = self;
-        let &Observed { grid, state, limb, ref since_epoch_d, .. } = star;
+        let &Observed { grid, state, limb, limb_alone, ref since_epoch_d, .. } = star;
         assert!(grid.len() == pixels && star.step_kms == step_kms);
-        let viewer = Viewer::new(state, limb, step_kms);
+        let viewer = Viewer::new(state, limb, limb_alone, step_kms);
         let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d });
         Deposit { step_kms, nodes, pixels, placement }
     }

@@ -18,6 +18,17 @@ impl LimbDarkening {
         }
     }
 
+    /// Coefficients of mu, mu^2, mu^3 and mu^4 in `mu LD(mu)`; or in `mu (1 - mu) LD(mu)`, which counts the limb alone.
+    pub(super) fn of_mu(self, limb_alone: bool) -> [f64; 4] {
+        // mu (1 - u1 (1 - mu) - u2 (1 - mu)^2)
+        let (u1, u2) = self.coefficients();
+        let [a, b, c] = [1.0 - u1 - u2, u1 + 2.0 * u2, -u2];
+        match limb_alone {
+            false => [a, b, c, 0.0],
+            true => [a, b - a, c - b, -c],
+        }
+    }
+
     /// The same law with another first coefficient.
     pub fn with_first(self, coefficient: f64) -> Self {
         match self {

@@ -36,6 +36,7 @@ pub mod orbit;
 mod photometry;
 mod placement;
 pub mod planet;
+pub mod regions;
 pub mod response;
 pub mod rotation;
 mod seen;
@@ -53,6 +54,7 @@ pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
 pub use orbit::{Eccentric, Motion, Orbit, Shape};
 pub use photometry::Band;
+pub use regions::Regions;
 pub use rotation::Rotation;
 pub use seen::{OwnMap, Sampling, Seen};
 pub use size::Size;
@@ -72,6 +74,8 @@ pub struct StarSettings {
     pub contrast: f64,
     /// The local line, instrumental broadening included.
     pub line: LocalLine,
+    /// What differs in active regions.
+    pub regions: Regions,
 }
 
 /// A local line: a Voigt profile, which without a Lorentzian is a Gaussian.
@@ -114,6 +118,18 @@ pub struct Surface {
     pub equivalent_width_kms: Option<f64>,
     /// Brightness of a wholly spotted pixel over that of the photosphere.
     pub contrast: Option<f64>,
+    /// What differs in active regions: width of the line, ...
+    pub region_line_width: Option<f64>,
+    /// ... its equivalent width, ...
+    pub region_equivalent_width: Option<f64>,
+    /// ... its velocity (km/s), ...
+    pub region_shift_kms: Option<f64>,
+    /// ... the surface with it, ...
+    pub region_area: Option<f64>,
+    /// ... and how much more of that there is at the limb; ...
+    pub region_area_limb: Option<f64>,
+    /// ... and how much darker they are there.
+    pub region_dimming_limb: Option<f64>,
 }
 
 impl StarSettings {
@@ -128,6 +144,7 @@ impl StarSettings {
         }
         star.line.equivalent_width_kms = surface.equivalent_width_kms.or(star.line.equivalent_width_kms);
         star.contrast = surface.contrast.unwrap_or(star.contrast);
+        star.regions = surface.regions(star.regions);
         star
     }
 
@@ -142,6 +159,20 @@ impl StarSettings {
     /// Rotation cycle `E = (t - epoch) / rotation_period` of a time (d).
     pub fn cycle(&self, time_d: f64) -> f64 {
         (time_d - self.epoch_d) / self.rotation_period_d
+    }
+}
+
+impl Surface {
+    /// Active regions, where those of the star's settings are these.
+    fn regions(&self, settings: Regions) -> Regions {
+        Regions {
+            line_width: self.region_line_width.unwrap_or(settings.line_width),
+            equivalent_width: self.region_equivalent_width.unwrap_or(settings.equivalent_width),
+            shift_kms: self.region_shift_kms.unwrap_or(settings.shift_kms),
+            area: self.region_area.unwrap_or(settings.area),
+            area_limb: self.region_area_limb.unwrap_or(settings.area_limb),
+            dimming_limb: self.region_dimming_limb.unwrap_or(settings.dimming_limb),
+        }
     }
 }
 

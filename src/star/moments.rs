@@ -5,7 +5,6 @@
 //! side, in single precision: weights, and velocities relative to the middle of the velocity grid's cell that they lie
 //! in. So are rings, as they turn.
 
-use super::limb_darkening::LimbDarkening;
 use crate::numerics::vector::Instructions;
 use crate::numerics::vector::elementary::{nearest_integer, sin_cos};
 
@@ -35,8 +34,8 @@ pub struct Rings<const POINTS: usize> {
     mu_pole: [[f32; CHUNK]; POINTS],
     mu_equator: [[f64; CHUNK]; POINTS],
     amplitude: [[f64; CHUNK]; POINTS],
-    /// Coefficients of mu, mu^2 and mu^3 in the weight.
-    limb: [[f32; CHUNK]; 3],
+    /// Coefficients of mu to mu^4 in the weight.
+    limb: [[f32; CHUNK]; 4],
     turned: Turned<POINTS>,
 }
 
@@ -81,13 +80,14 @@ impl<const POINTS: usize> Rings<POINTS> {
             mu_pole: [[0.0; CHUNK]; POINTS],
             mu_equator: none,
             amplitude: none,
-            limb: [[0.0; CHUNK]; 3],
+            limb: [[0.0; CHUNK]; 4],
             turned,
         }
     }
 
-    /// Sets one of the rings: its points, each of which stands for so large a part of the star.
-    pub fn set(&mut self, ring: usize, points: [Point; POINTS], limb: LimbDarkening, area: f64) {
+    /// Sets one of the rings: its points, each of which stands for so large a part of the star, and coefficients of mu to
+    /// mu^4 in their weights.
+    pub fn set(&mut self, ring: usize, points: [Point; POINTS], limb: [f64; 4], area: f64) {
         for (p, point) in points.into_iter().enumerate() {
             self.angular_velocity[p][ring] = point.angular_velocity;
             self.offset[p][ring] = point.offset;
@@ -95,9 +95,7 @@ impl<const POINTS: usize> Rings<POINTS> {
             self.mu_equator[p][ring] = point.mu_equator;
             self.amplitude[p][ring] = point.amplitude;
         }
-        // mu LD(mu) = mu (1 - u1 (1 - mu) - u2 (1 - mu)^2)
-        let (u1, u2) = limb.coefficients();
-        for (of_rings, coefficient) in self.limb.iter_mut().zip([1.0 - u1 - u2, u1 + 2.0 * u2, -u2]) {
+        for (of_rings, coefficient) in self.limb.iter_mut().zip(limb) {
             of_rings[ring] = (area * coefficient) as f32;
         }
     }
@@ -173,7 +171,7 @@ impl<const POINTS: usize> Rings<POINTS> {
         sin_l: [f32; CHUNK],
     ) -> [[f32; CHUNK]; 3] {
         let Rings { mu_pole, limb, turned: Turned { mu, velocity, .. }, .. } = self;
-        let limb = [limb[0][ring], limb[1][ring], limb[2][ring]];
+        let limb = limb.each_ref().map(|of_rings| of_rings[ring]);
         let [mut weight, mut deviation, mut spread] = [[0.0; CHUNK]; 3];
         for lane in 0..CHUNK {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
@@ -181,7 +179,8 @@ impl<const POINTS: usize> Rings<POINTS> {
                 let on_equator = i.multiply_add_single(sin_l[lane], mu[1][p][ring], mu_pole[p][ring]);
                 let mu = i.multiply_add_single(cos_l[lane], mu[0][p][ring], on_equator);
                 let mu = if mu > 0.0 { mu } else { 0.0 };
-                let limb_darkening = i.multiply_add_single(mu, i.multiply_add_single(mu, limb[2], limb[1]), limb[0]);
+                let outer = i.multiply_add_single(mu, limb[3], limb[2]);
+                let limb_darkening = i.multiply_add_single(mu, i.multiply_add_single(mu, outer, limb[1]), limb[0]);
                 let w = mu * limb_darkening;
                 let v = i.multiply_add_single(cos_l[lane], velocity[0][p][ring], sin_l[lane] * velocity[1][p][ring]);
                 let moment = w * v;

@@ -2,7 +2,7 @@
 
 use super::deposit::{Arranged, Observed};
 use super::grid::SurfaceGrid;
-use super::response::{Part, observed};
+use super::response::{DEPOSITS, Part, needs, observed};
 use super::{Response, Seen, StarSettings, StarState};
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ impl Nearby {
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
         let arranged = |set: &Seen| {
             let star = set.star(star).with(&state.surface);
-            Arranged::new(&observed(grid, &star, state, set), MARGIN)
+            Arranged::new(&observed(grid, &star, state, set, false), MARGIN)
         };
         Nearby { state: *state, pixels: sets.iter().map(arranged).collect() }
     }
@@ -49,9 +49,14 @@ impl Nearby {
     ) -> Option<Response> {
         let part = |(pixels, set): (&Arranged, &Seen)| {
             let star = &set.star(star).with(&state.surface);
-            let observed = observed(grid, star, state, set);
-            self.is_close(pixels, &observed)
-                .then(|| Part::shifted(Arc::new(pixels.deposit(&observed)), star, state, set))
+            let deposits = || {
+                DEPOSITS.map(|limb_alone| {
+                    let observed = observed(grid, star, state, set, limb_alone);
+                    needs(star, limb_alone).then(|| Arc::new(pixels.deposit(&observed)))
+                })
+            };
+            let is_close = self.is_close(pixels, &observed(grid, star, state, set, false));
+            is_close.then(|| Part::shifted(deposits(), star, state, set))
         };
         self.pixels.iter().zip(sets).map(part).collect::<Option<Vec<_>>>().map(Response::stacked)
     }
@@ -82,7 +87,7 @@ impl Nearby {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation, Sampling};
+    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Regions, Rotation, Sampling};
 
     const STAR: StarSettings = StarSettings {
         rotation_period_d: 3.0,
@@ -95,6 +100,7 @@ mod tests {
             gamma_kms: 0.0,
             equivalent_width_kms: Some(5.8),
         },
+        regions: Regions::PLAIN,
     };
 
     /// The star, and so much another one.

@@ -18,7 +18,8 @@ impl Band {
         self.contrast.unwrap_or_else(|| star.with(&state.surface).contrast)
     }
 
-    /// The share of each pixel in the flux of the bare photosphere, the mean of these times (d); they add up to 1.
+    /// What a spot on each pixel dims the flux of the bare photosphere by, over its own dimming, the mean of these times
+    /// (d). Where spots are as dark at the limb these are the pixels' shares in the flux, and add up to 1.
     pub fn shares(&self, grid: &SurfaceGrid, star: &StarSettings, state: &StarState, times_d: &[f64]) -> Vec<f64> {
         let (mut star, mut state) = (star.clone(), *state);
         if let Some(limb_darkening) = self.limb_darkening {
@@ -28,9 +29,11 @@ impl Band {
         // profiles without bins: what counts is their continuum
         let profiles = times_d.iter().map(|time_d| (*time_d, 0.0, 0)).collect();
         let sampling = Sampling { step_kms: star.with(&state.surface).line.sigma_kms, profiles };
-        let mut shares = vec![0.0; grid.len()];
-        Response::new(grid, &star, &state, &sampling).apply_transpose(&[], &vec![1.0; times_d.len()], &mut shares);
-        let total: f64 = shares.iter().sum();
+        let (mut shares, mut fluxes) = (vec![0.0; grid.len()], vec![0.0; times_d.len()]);
+        let response = Response::new(grid, &star, &state, &sampling);
+        response.apply_transpose(&[], &vec![1.0; times_d.len()], &mut shares);
+        response.apply(&vec![1.0; grid.len()], &mut [], &mut fluxes);
+        let total: f64 = fluxes.iter().sum();
         shares.iter_mut().for_each(|share| *share /= total);
         shares
     }
@@ -39,7 +42,7 @@ impl Band {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::{LocalLine, Orbit, Quadrature, Rotation, Surface};
+    use crate::star::{LocalLine, Orbit, Quadrature, Regions, Rotation, Surface};
 
     /// Shares of single pixels by the formula, on a grid so fine that a pixel is a point; and the limb darkening is
     /// that of the band, whatever a free parameter says of the star's.
@@ -53,6 +56,7 @@ mod tests {
             limb_darkening: LimbDarkening::Linear(0.9),
             contrast: 0.4,
             line: LocalLine::gaussian(3.0, 5.0),
+            regions: Regions::PLAIN,
         };
         let inclination: f64 = 1.1;
         let state = StarState {

@@ -7,8 +7,9 @@ use super::convolution::{Convolutions, Rows, VelocityGrid};
 use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
+use super::regions::Mixture;
 use super::seen::Seen;
-use super::{StarSettings, StarState};
+use super::{LocalLine, StarSettings, StarState};
 use crate::numerics::vector::{self, Instructions, Number, Task};
 use nalgebra::DMatrixView;
 use std::sync::Arc;
@@ -32,20 +33,36 @@ pub(super) struct Part {
     contrast: f64,
     /// Of each profile the number of its map; empty where there is one.
     map_of: Vec<usize>,
+    regions: Option<RegionPart>,
+}
+
+/// What active regions add, where they are more than the photosphere, dimmed.
+#[derive(Clone, Debug)]
+struct RegionPart {
+    /// Deposits weighted by `1 - mu`, too, where anything depends on that.
+    limb: Option<Arc<Deposit>>,
+    convolutions: Convolutions,
+    mixture: Mixture,
+    /// What the photosphere shows beyond a map of brightness 1 seen as spots are: depth of every bin, and continuum.
+    beyond: (Vec<f64>, Vec<f64>),
 }
 
 impl Part {
     /// The response at one state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
         let star = &star.with(&state.surface);
-        let deposit = Deposit::new(&observed(grid, star, state, seen));
-        Part::shifted(Arc::new(deposit), star, state, seen)
+        let deposits = DEPOSITS.map(|limb_alone| {
+            let observed = observed(grid, star, state, seen, limb_alone);
+            needs(star, limb_alone).then(|| Arc::new(Deposit::new(&observed)))
+        });
+        Part::shifted(deposits, star, state, seen)
     }
 
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
-        Part::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, seen)
+        let limb = self.regions.as_ref().and_then(|regions| regions.limb.clone());
+        Part::shifted([Some(Arc::clone(&self.deposit)), limb], &star.with(&state.surface), state, seen)
     }
 
     /// Where the map that profile `k` sees stands among `all` pixels; a map that is alone is seen by all.
@@ -57,32 +74,77 @@ impl Part {
         }
     }
 
-    /// The response of deposits, which orbit and systemic velocity shift.
-    pub(super) fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
-        let sampling = &seen.sampling;
-        let kernel = LineKernel::new(star.line, deposit.step_kms);
+    /// The response of deposits ([`DEPOSITS`]), which orbit and systemic velocity shift.
+    ///
+    /// # Panics
+    /// If the first is missing.
+    pub(super) fn shifted(
+        [deposit, limb]: [Option<Arc<Deposit>>; 2],
+        star: &StarSettings,
+        state: &StarState,
+        seen: &Seen,
+    ) -> Self {
+        let (deposit, sampling) = (deposit.expect("deposits of the pixels as they are"), &seen.sampling);
         let grid = VelocityGrid {
             nodes: deposit.nodes,
             step_kms: deposit.step_kms,
-            steps_per_bin: LineKernel::steps_per_bin(star.line, sampling.step_kms),
+            steps_per_bin: LineKernel::steps_per_bin(narrowest(star), sampling.step_kms),
         };
         let mut starts = vec![0];
         starts.extend(sampling.profiles.iter().scan(0, |end, &(.., bins)| {
             *end += bins;
             Some(*end)
         }));
-        let profiles = sampling.profiles.iter().map(|&(time, first_velocity, bins)| {
-            let shift = state.vsys_kms + state.motion.velocity_kms(star.cycle(time));
-            (first_velocity - shift - deposit.origin_kms(), bins)
-        });
+        let convolutions = |line: LocalLine, shift_kms: f64| {
+            let profiles = sampling.profiles.iter().map(|&(time, first_velocity, bins)| {
+                let shift = state.vsys_kms + state.motion.velocity_kms(star.cycle(time)) + shift_kms;
+                (first_velocity - shift - deposit.origin_kms(), bins)
+            });
+            Convolutions::new(&LineKernel::new(line, deposit.step_kms), grid, profiles)
+        };
         let map_of = seen.own_maps.iter().map(|own| own.number).collect();
-        let convolutions = Convolutions::new(&kernel, grid, profiles);
-        Part { deposit, convolutions, starts, contrast: star.contrast, map_of }
+        let regions = (!star.regions.are_plain()).then(|| RegionPart {
+            limb,
+            convolutions: convolutions(star.regions.line(star.line), star.regions.shift_kms),
+            mixture: star.regions.mixture(star.contrast),
+            beyond: Default::default(),
+        });
+        let convolutions = convolutions(star.line, 0.0);
+        let mut part = Part { deposit, convolutions, starts, contrast: star.contrast, map_of, regions };
+        part.find_what_is_beyond();
+        part
     }
 
-    fn rows(&self) -> Rows {
-        let bins = self.starts.windows(2).map(|s| s[1] - s[0]);
-        self.convolutions.rows(bins.max().unwrap_or(0))
+    /// What the photosphere shows beyond a map of brightness 1 seen as spots are.
+    fn find_what_is_beyond(&mut self) {
+        let Some(regions) = self.regions.take() else { return };
+        let maps = self.map_of.iter().max().map_or(1, |last| last + 1);
+        let ones = vec![1.0; maps * self.pixels()];
+        let seen = |part: &Part| {
+            let (mut line, mut continuum) = (vec![0.0; part.starts[part.profiles()]], vec![0.0; part.profiles()]);
+            part.change(&ones, &mut line, &mut continuum);
+            (line, continuum)
+        };
+        let (mut line, mut continuum) = seen(self);
+        self.regions = Some(regions);
+        let (line_as_spots, continuum_as_spots) = seen(self);
+        line.iter_mut().zip(line_as_spots).for_each(|(line, as_spots)| *line -= as_spots);
+        continuum.iter_mut().zip(continuum_as_spots).for_each(|(continuum, as_spots)| *continuum -= as_spots);
+        self.regions.as_mut().expect("set above").beyond = (line, continuum);
+    }
+
+    /// Adds what the photosphere shows beyond a map of brightness 1 seen as spots are to profile `k`; to its continuum,
+    /// which is given back.
+    fn beyond(&self, k: usize, line: &mut [f64], continuum: f64) -> f64 {
+        let Some(RegionPart { beyond: (of_lines, of_continua), .. }) = &self.regions else { return continuum };
+        line.iter_mut().zip(&of_lines[self.bins(k)]).for_each(|(line, beyond)| *line += beyond);
+        continuum + of_continua[k]
+    }
+
+    fn rows(&self) -> [Rows; 2] {
+        let bins = self.starts.windows(2).map(|s| s[1] - s[0]).max().unwrap_or(0);
+        let of_regions = self.regions.as_ref().map_or(&self.convolutions, |regions| &regions.convolutions);
+        [self.convolutions.rows(bins), of_regions.rows(bins)]
     }
 
     /// Brightness of a spot over that of the photosphere in the state that it was made at.
@@ -121,13 +183,21 @@ impl Part {
         self.starts[self.starts.len() - 1]
     }
 
-    /// Line depth of every bin and continuum of every profile for the map `x`.
+    /// Line depth of every bin and continuum of every profile for the brightness map `x`.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        self.change(x, line, continuum);
+        for (k, continuum) in continuum.iter_mut().enumerate() {
+            *continuum = self.beyond(k, &mut line[self.bins(k)], *continuum);
+        }
+    }
+
+    /// How they change with the brightness, by `x`.
+    pub fn change(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         vector::run(Apply { response: self, x, line, continuum });
     }
 
-    /// Transpose of [`Part::apply`]; `out` is overwritten.
+    /// Transpose of [`Part::change`]; `out` is overwritten.
     pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         vector::run(ApplyTranspose { response: self, line, continuum, out });
@@ -152,8 +222,25 @@ impl Part {
 /// [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is asked for.
 pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
     let star = star.with(&state.surface);
-    let steps = LineKernel::steps_per_bin(star.line, step_kms) as f64;
+    let steps = LineKernel::steps_per_bin(narrowest(&star), step_kms) as f64;
     (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
+}
+
+/// The deposits that a response may need: of pixels as they are, and weighted by `1 - mu`.
+pub(super) const DEPOSITS: [bool; 2] = [false, true];
+
+/// Whether a star needs one of them.
+pub(super) fn needs(star: &StarSettings, limb_alone: bool) -> bool {
+    !limb_alone || star.regions.know_the_limb()
+}
+
+/// The narrower one of the star's lines.
+fn narrowest(star: &StarSettings) -> LocalLine {
+    let of_regions = star.regions.line(star.line);
+    match star.regions.are_plain() || star.line.sigma_kms <= of_regions.sigma_kms {
+        true => star.line,
+        false => of_regions,
+    }
 }
 
 /// A star, its surface that of the state, as it is observed.
@@ -162,47 +249,87 @@ pub(super) fn observed<'a>(
     star: &StarSettings,
     state: &'a StarState,
     seen: &Seen,
+    limb_alone: bool,
 ) -> Observed<'a> {
     let sampling = &seen.sampling;
     let epoch_d = |k: usize| seen.own_maps.get(k).map_or(star.epoch_d, |own| own.epoch_d);
     let since_epoch_d = sampling.profiles.iter().enumerate().map(|(k, p)| p.0 - epoch_d(k)).collect();
-    let step_kms = sampling.step_kms / LineKernel::steps_per_bin(star.line, sampling.step_kms) as f64;
-    Observed { grid, state, limb: star.limb_darkening, since_epoch_d, step_kms }
+    let step_kms = sampling.step_kms / LineKernel::steps_per_bin(narrowest(star), sampling.step_kms) as f64;
+    Observed { grid, state, limb: star.limb_darkening, limb_alone, since_epoch_d, step_kms }
 }
 
 /// One profile after another, in one direction: the rows of the grid are left as that direction left them.
 struct Pass<'a, N> {
     response: &'a Part,
-    nodes: Vec<f64>,
+    /// Of the photosphere's line, and of that of regions.
+    nodes: [Vec<f64>; 2],
+    /// Of pixels as they are, and weighted by `1 - mu`.
+    deposited: [Vec<f64>; 2],
     /// What cells leave on their nodes, or what they are given there.
     of_cells: Vec<N>,
-    rows: Rows,
+    rows: [Rows; 2],
 }
 
 impl<'a, N: Number> Pass<'a, N> {
     fn new(response: &'a Part) -> Self {
-        Pass { response, nodes: vec![0.0; response.deposit.nodes], of_cells: Vec::new(), rows: response.rows() }
+        let nodes = || vec![0.0; response.deposit.nodes];
+        let (nodes, deposited) = ([nodes(), nodes()], [nodes(), nodes()]);
+        Pass { response, nodes, deposited, of_cells: Vec::new(), rows: response.rows() }
     }
 
-    /// Line depth of every bin of profile `k` (overwritten) for the map `x`; returns its continuum.
+    /// Line depth of every bin of profile `k` (overwritten) for the map `x`, seen as spots are; returns its continuum.
     #[inline(always)]
     fn forward<I: Instructions>(&mut self, i: I, k: usize, x: &[N], line: &mut [f64]) -> f64 {
-        let Pass { response, nodes, of_cells, rows } = self;
-        response.deposit.gather(i, k, x, of_cells, nodes);
-        rows.interleave(nodes);
-        response.convolutions.sum_to_bins(i, k, rows, line);
-        total(nodes)
+        let Pass { response, nodes: [nodes, of_regions], deposited, of_cells, rows } = self;
+        let Part { deposit, convolutions, regions, .. } = response;
+        let Some(RegionPart { limb, convolutions: region_convolutions, mixture, .. }) = regions else {
+            deposit.gather(i, k, x, of_cells, nodes);
+            rows[0].interleave(nodes);
+            convolutions.sum_to_bins(i, k, &rows[0], line);
+            return total(nodes);
+        };
+        deposit.gather(i, k, x, of_cells, &mut deposited[0]);
+        if let Some(limb) = limb {
+            limb.gather(i, k, x, of_cells, &mut deposited[1]);
+        }
+        let sums = [(&mut *nodes, mixture.own), (&mut *of_regions, mixture.region)];
+        for (nodes, [factor, limb_factor]) in sums {
+            for (node, (all, limb)) in nodes.iter_mut().zip(deposited[0].iter().zip(&deposited[1])) {
+                *node = factor * all + limb_factor * limb;
+            }
+        }
+        rows[0].interleave(nodes);
+        convolutions.sum_to_bins(i, k, &rows[0], line);
+        let mut of_line = vec![0.0; line.len()];
+        rows[1].interleave(of_regions);
+        region_convolutions.sum_to_bins(i, k, &rows[1], &mut of_line);
+        line.iter_mut().zip(of_line).for_each(|(line, of_regions)| *line += of_regions);
+        total(nodes) + total(of_regions)
     }
 
     /// Transpose of [`Pass::forward`]: adds to the map `out`.
     #[inline(always)]
     fn back<I: Instructions>(&mut self, i: I, k: usize, line: &[f64], continuum: f64, out: &mut [N]) {
-        let Pass { response, nodes, of_cells, rows } = self;
-        response.convolutions.spread_bins(i, k, line, rows);
-        rows.deinterleave(nodes);
+        let Pass { response, nodes: [nodes, of_regions], of_cells, rows, .. } = self;
+        let Part { deposit, convolutions, regions, .. } = response;
+        convolutions.spread_bins(i, k, line, &mut rows[0]);
+        rows[0].deinterleave(nodes);
         of_cells.resize(nodes.len(), N::default());
-        of_cells.iter_mut().zip(&*nodes).for_each(|(of_cell, node)| *of_cell = N::of(node + continuum));
-        response.deposit.scatter(i, k, of_cells, out);
+        let Some(RegionPart { limb, convolutions: region_convolutions, mixture, .. }) = regions else {
+            of_cells.iter_mut().zip(&*nodes).for_each(|(of_cell, node)| *of_cell = N::of(node + continuum));
+            deposit.scatter(i, k, of_cells, out);
+            return;
+        };
+        region_convolutions.spread_bins(i, k, line, &mut rows[1]);
+        rows[1].deinterleave(of_regions);
+        for (which, deposit) in [Some(deposit), limb.as_ref()].into_iter().enumerate() {
+            let Some(deposit) = deposit else { continue };
+            let (own, region) = (mixture.own[which], mixture.region[which]);
+            for (of_cell, (node, of_regions)) in of_cells.iter_mut().zip(nodes.iter().zip(&*of_regions)) {
+                *of_cell = N::of(own * (node + continuum) + region * (of_regions + continuum));
+            }
+            deposit.scatter(i, k, of_cells, out);
+        }
     }
 }
 
@@ -242,6 +369,7 @@ impl Task for OfEach<'_> {
         for (k, map) in brightness.column_iter().enumerate() {
             let depths = &mut depths[response.bins(k)];
             let continuum = pass.forward(instructions, k, map.as_slice(), depths);
+            let continuum = response.beyond(k, depths, continuum);
             depths.iter_mut().for_each(|depth| *depth /= continuum);
         }
     }
@@ -310,7 +438,7 @@ fn total(x: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::numerics::vector::Portable;
-    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation, Sampling};
+    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Regions, Rotation, Sampling};
 
     fn noise(n: usize) -> Vec<f64> {
         (0..n).map(|i| (0.7 * (i * i) as f64).sin()).collect()
@@ -329,6 +457,7 @@ mod tests {
             limb_darkening: LimbDarkening::Linear(0.7),
             contrast: 0.5,
             line: LocalLine::gaussian(3.0, 5.8),
+            regions: Regions::PLAIN,
         };
         let state = StarState {
             rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.05 },

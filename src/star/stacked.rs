@@ -94,8 +94,8 @@ impl Response {
         })
     }
 
-    /// Line depth of every bin and continuum of every profile for the map `x`; or for the maps in `x`, one after the
-    /// other, of which each profile sees its own.
+    /// Line depth of every bin and continuum of every profile for the brightness map `x`; or for the maps in `x`, one
+    /// after the other, of which each profile sees its own.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         for (part, profiles, bins) in self.places() {
@@ -103,7 +103,15 @@ impl Response {
         }
     }
 
-    /// The same of maps that are another one in each data set, as the brightness of spots is: `fill` is given the first
+    /// How they change with the brightness, by `x`.
+    pub fn change(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        assert_eq!(continuum.len(), self.profiles());
+        for (part, profiles, bins) in self.places() {
+            part.change(x, &mut line[bins], &mut continuum[profiles]);
+        }
+    }
+
+    /// What [`Response::apply`] gives of maps that are another one in each data set, as the brightness of spots is: `fill` is given the first
     /// profile of the set, and makes its `map`.
     pub fn apply_each(
         &self,
@@ -118,15 +126,15 @@ impl Response {
         }
     }
 
-    /// Transpose of [`Response::apply`]; `out` is overwritten.
+    /// Transpose of [`Response::change`]; `out` is overwritten.
     pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         self.summed(out, |part, profiles, bins, out| part.apply_transpose(&line[bins], &continuum[profiles], out));
     }
 
-    /// The transpose of what `weigh` makes of the line depth and continuum of every profile for the map `x`: given the
-    /// number of a profile, the depth of its bins, and its continuum, it replaces the depths, and returns what replaces
-    /// the continuum. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads
+    /// The transpose of what `weigh` makes of the changes of line depth and continuum of every profile by `x`: given the
+    /// number of a profile, those of its bins, and of its continuum, it replaces the former, and returns what replaces
+    /// the latter. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads
     /// comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
     pub fn apply_and_back<N: Number>(
         &self,

@@ -16,7 +16,8 @@ pub struct Viewer {
     rotation: Rotation,
     sin_inclination: f64,
     cos_inclination: f64,
-    limb: LimbDarkening,
+    /// Coefficients of mu to mu^4 in the weight of a pixel.
+    limb: [f64; 4],
     /// vsini in steps of the velocity grid.
     vsini: f64,
 }
@@ -80,8 +81,10 @@ pub struct Part {
 }
 
 impl Viewer {
-    /// The view of a star in a given state, its velocities in steps of `step_kms`.
-    pub fn new(state: &StarState, limb: LimbDarkening, step_kms: f64) -> Self {
+    /// The view of a star in a given state, its velocities in steps of `step_kms`; pixels weighted by `1 - mu`, too,
+    /// where the limb alone counts.
+    pub fn new(state: &StarState, limb: LimbDarkening, limb_alone: bool, step_kms: f64) -> Self {
+        let limb = limb.of_mu(limb_alone);
         let (sin_inclination, cos_inclination) = state.inclination.sin_cos();
         Viewer { rotation: state.rotation, sin_inclination, cos_inclination, limb, vsini: state.vsini_kms / step_kms }
     }

@@ -185,6 +185,7 @@ impl Values {
                 gamma_kms,
                 equivalent_width_kms: equivalent_width(cuts, known, ledger),
             },
+            regions: None,
         };
         let imaging = imaging(known, ledger);
         let sought = Sought {

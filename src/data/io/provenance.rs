@@ -5,6 +5,7 @@ use crate::surface::ConstantVelocity;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
+use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::target::ChosenTarget;
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +49,9 @@ pub struct Measured {
     /// What was left out of the light curves and converted, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curve_notes: Vec<String>,
+    /// `star.regions`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub star: Option<MeasuredStar>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
@@ -128,6 +132,7 @@ impl Measured {
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("RV jitter", jitter.line()));
+        let star = self.star.as_ref().map(|star| ("active regions", star.line()));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
             let Season { first_d, last_d, profiles, .. } = season;
@@ -136,6 +141,6 @@ impl Measured {
         let seasons = self.seasons.iter().map(season);
         let light =
             self.light_curves.iter().chain(&self.light_curve_notes).map(|remark| ("light curve", remark.clone()));
-        profiles.chain(sets).chain(seasons).chain(light).chain(errors).chain(jitter).chain(target).collect()
+        profiles.chain(sets).chain(seasons).chain(light).chain(errors).chain(jitter).chain(star).chain(target).collect()
     }
 }

@@ -119,7 +119,7 @@ impl WholeWay {
     pub fn scene(&self) -> Result<Scene, WholeWayError> {
         let scene = Scene::new(&Config::at(self.resolved.clone(), &self.config))?;
         match scene.data_sha256 == self.data_sha256 {
-            true => Ok(scene),
+            true => Ok(scene.fitted(&|_| ())),
             false => Err(WholeWayError::Changed(self.config.clone())),
         }
     }

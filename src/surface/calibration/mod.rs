@@ -6,4 +6,5 @@ pub mod first_look;
 pub mod jitter;
 pub mod noise;
 pub mod offsets;
+pub mod star;
 pub mod target;

@@ -21,9 +21,9 @@ pub struct Design {
     line: Vec<Arc<DMatrix<f64>>>,
     /// (H, profiles).
     continuum: DMatrix<f64>,
-    /// The same of a star without spots.
-    bare_line: Vec<DVector<f64>>,
-    bare_continuum: Vec<f64>,
+    /// The same of a star that is spotted alike all over, as much as stars of which nothing else is known.
+    mean_line: Vec<DVector<f64>>,
+    mean_continuum: Vec<f64>,
     light: Light,
 }
 
@@ -40,13 +40,13 @@ impl Design {
         (response, state): (Response, &StarState),
         like: Option<&Design>,
     ) -> Self {
-        let apply = |map: &[f64]| {
+        let change = |map: &[f64]| {
             let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
-            response.apply(map, &mut line, &mut continuum);
+            response.change(map, &mut line, &mut continuum);
             (line, continuum)
         };
         let columns: Vec<(Vec<f64>, Vec<f64>)> =
-            (0..basis.degrees.len()).into_par_iter().map(|h| apply(basis.on_pixels.column(h).as_slice())).collect();
+            (0..basis.degrees.len()).into_par_iter().map(|h| change(basis.on_pixels.column(h).as_slice())).collect();
         let of_profile = |k: usize| {
             let bins = response.bins(k);
             let mut line = DMatrix::zeros(bins.len(), columns.len());
@@ -59,19 +59,19 @@ impl Design {
         let continuum = DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]);
         // of many profiles it is hundreds of megabytes
         drop(columns);
-        let (bare, bare_continuum) = apply(&vec![1.0; response.pixels()]);
+        let [(bare, _), (mean, mean_continuum)] = [0.0, MEAN_FILLING].map(|filling| uniform(&response, filling));
         let condensed = match like {
             Some(like) => Arc::clone(&like.condensed),
             None => Arc::new(Condensed::new(imager, basis, (&response, state), &lines, &bare)),
         };
         let line = lines.par_iter().enumerate().map(|(k, line)| Arc::new(condensed.tell(k, line))).collect();
-        let bare = |k: usize| {
-            let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &bare[response.bins(k)]);
+        let mean = |k: usize| {
+            let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &mean[response.bins(k)]);
             condensed.tell(k, &bins).column(0).into_owned()
         };
-        let bare_line = (0..response.profiles()).map(bare).collect();
+        let mean_line = (0..response.profiles()).map(mean).collect();
         let light = Light::new(imager, basis, state);
-        Design { response, condensed, line, continuum, bare_line, bare_continuum, light }
+        Design { response, condensed, line, continuum, mean_line, mean_continuum, light }
     }
 
     /// Columns over the bins of each profile in its numbers.
@@ -98,10 +98,8 @@ impl Design {
     /// Model depths of profile `k` for a map of these coefficients, and its continuum.
     fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
         let q = 1.0 - self.response.contrast(k);
-        let bare = 1.0 - q * MEAN_FILLING;
-        let continuum = bare * self.bare_continuum[k] - q * self.continuum.column(k).dot(coefficients);
-        let line = &self.bare_line[k] * bare;
-        ((line - &*self.line[k] * coefficients * q) / continuum, continuum)
+        let continuum = self.mean_continuum[k] - q * self.continuum.column(k).dot(coefficients);
+        ((&self.mean_line[k] - &*self.line[k] * coefficients * q) / continuum, continuum)
     }
 
     /// The profiles, then the bins of light curves, linearised around maps of these coefficients (H, epochs), without
@@ -132,4 +130,14 @@ impl Design {
             beside: self.condensed.beside[k],
         }
     }
+}
+
+/// Line depth and continuum of every profile of a star that is spotted alike all over.
+fn uniform(response: &Response, filling: f64) -> (Vec<f64>, Vec<f64>) {
+    let mut map = vec![0.0; response.pixels()];
+    let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
+    response.apply_each(&mut map, &mut line, &mut continuum, |first, map| {
+        map.fill(1.0 - (1.0 - response.contrast(first)) * filling);
+    });
+    (line, continuum)
 }

@@ -47,7 +47,8 @@ impl Light {
             let times_d = [bin.time_d - bin.spread_d, bin.time_d + bin.spread_d];
             let mut shares = curve.band.shares(&imager.grid, &imager.star, state, &times_d);
             let q = 1.0 - curve.band.contrast(&imager.star, state);
-            let scale = -q / (1.0 - q * MEAN_FILLING);
+            // darker towards the limb, the sum is more than 1
+            let scale = -q / (1.0 - q * MEAN_FILLING * shares.iter().sum::<f64>());
             shares.iter_mut().for_each(|share| *share *= scale);
             shares
         };

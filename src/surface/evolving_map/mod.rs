@@ -32,6 +32,7 @@ mod optimum;
 mod planned;
 mod posterior;
 mod rotation;
+pub mod star;
 mod surface;
 
 pub use basis::Basis;

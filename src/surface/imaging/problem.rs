@@ -106,7 +106,7 @@ impl<'a> ImagingProblem<'a> {
     /// Change of every bin's model depth to first order in the change `v` of the map, at the current map.
     pub fn model_change(&mut self, v: &[f64], out: &mut [f64]) {
         self.model_applications += 1;
-        self.response.apply(v, out, &mut self.constants);
+        self.response.change(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
             let scale = self.brightness_of[k].slope / self.continuum[k];
             for j in self.response.bins(k) {

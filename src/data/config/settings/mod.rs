@@ -31,7 +31,7 @@ use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
 use photometry::resolve_photometry;
 use simulation::check_plan;
-use star::resolve_star;
+use star::{fitted_regions, resolve_star};
 use std::path::{Path, PathBuf};
 
 /// A whole config, resolved.
@@ -59,6 +59,8 @@ pub struct Settings {
     pub free: Vec<FreeParameter>,
     /// The chain.
     pub sampler: SamplerSettings,
+    /// Numbers of the star that are fitted to the profiles.
+    pub fitted: Vec<Parameter>,
     /// The landscape.
     pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
@@ -94,6 +96,10 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
             "has no effect on a bright-and-dark map, which holds the brightness itself",
         ));
     }
+    let fitted = match written.imaging.objective.properties().has_field {
+        true => fitted_regions(&written.star.regions.unwrap_or_default()),
+        false => Vec::new(),
+    };
     let grid = written.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
     let resolved = serde_json::to_value(&written).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {
@@ -108,6 +114,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         imaging: written.imaging,
         free,
         sampler: written.sampler,
+        fitted,
         grid,
         sha256: fingerprint(&resolved),
         resolved,
@@ -139,6 +146,7 @@ fn values(written: &Config, resolved: &StarSettings) -> Result<ParameterValues, 
             _ if parameter.is_orbital() => written.planet.get(parameter).expect("the planet has what is usual"),
             _ => match written.number_at(key) {
                 Some(value) => value,
+                None if Parameter::REGIONS.contains(&parameter) => parameter.usual(),
                 None => return Err(Fault::new(key, "auto is no start of a free parameter, give a number")),
             },
         };

@@ -2,9 +2,10 @@
 
 use super::checks::{automatic, check_size, most, positive};
 use crate::data::config::error::Fault;
-use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
+use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star};
+use crate::model::Parameter;
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use crate::star::{LimbDarkening, LocalLine, StarSettings};
+use crate::star::{LimbDarkening, LocalLine, Regions, StarSettings};
 use std::f64::consts::TAU;
 
 /// Lightest and heaviest star (solar masses).
@@ -32,7 +33,38 @@ pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<S
         limb_darkening: limb_darkening(&star.limb_darkening)?,
         contrast: contrast(star)?,
         line: local_line(&star.line, instrument)?,
+        regions: regions(&star.regions.unwrap_or_default())?,
     })
+}
+
+/// The numbers of active regions as written, in the order of [`Parameter::REGIONS`].
+fn numbers(section: &RegionsSection) -> [Option<f64>; Parameter::REGIONS.len()] {
+    let RegionsSection { line_width, equivalent_width, shift_kms, area, area_limb, dimming_limb } = section;
+    [line_width, equivalent_width, shift_kms, area, area_limb, dimming_limb].map(|number| number.number())
+}
+
+/// Active regions as far as they are given.
+fn regions(section: &RegionsSection) -> Result<Regions, Fault> {
+    let numbers = numbers(section);
+    for (parameter, number) in Parameter::REGIONS.into_iter().zip(numbers) {
+        let (spec, (least, most)) = (parameter.spec(), parameter.widest());
+        if let Some(number) = number.filter(|number| !(least..=most).contains(number)) {
+            return Err(Fault::new(spec.config_key, format!("{number} must be from {least} to {most}")));
+        }
+    }
+    let plain = Parameter::REGIONS.map(Parameter::usual);
+    let [line_width, equivalent_width, shift_kms, area, area_limb, dimming_limb] =
+        std::array::from_fn(|i| numbers[i].unwrap_or(plain[i]));
+    Ok(Regions { line_width, equivalent_width, shift_kms, area, area_limb, dimming_limb })
+}
+
+/// Which numbers of active regions are fitted: those that are not given. Without regions that are more than spots
+/// their line counts for nothing.
+pub(super) fn fitted_regions(section: &RegionsSection) -> Vec<Parameter> {
+    let numbers = numbers(section);
+    let none = numbers[3..].iter().all(|number| *number == Some(0.0));
+    let fitted = Parameter::REGIONS.into_iter().zip(numbers).filter(|(_, number)| number.is_none());
+    if none { Vec::new() } else { fitted.map(|(parameter, _)| parameter).collect() }
 }
 
 pub(super) fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault> {

@@ -28,6 +28,13 @@ pub type ZeroPoint = NumberOr<FittedOffset>;
 /// A hyperparameter of the field of spots; fitted: that for which the profiles are most probable.
 pub type Hyperparameter = NumberOr<OfField>;
 
+/// A number of the star; fitted: that for which the profiles are most probable.
+pub type OfStar = NumberOr<FittedStar>;
+
+/// "fitted", of a number of the star.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedStar;
+
 /// "auto".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Auto;
@@ -97,6 +104,17 @@ impl Word for FittedOffset {
     }
 }
 
+impl Word for FittedStar {
+    const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedStar)];
+    const EXPECTED: &'static str = "a number or \"fitted\"";
+    const SCHEMA: [&'static str; 2] =
+        ["FittedStar", "A number, or \"fitted\": that for which the profiles are most probable."];
+
+    fn bounds() -> Value {
+        json!({})
+    }
+}
+
 impl Word for OfField {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", OfField::Fitted), ("static", OfField::Static)];
     const EXPECTED: &'static str = "a number, \"fitted\", or (a lifetime) \"static\"";
@@ -127,6 +145,12 @@ impl VelocityJitter {
     /// As configs mention it: none is left out where that is usual.
     pub fn mentioned(self, objective: ObjectiveKind) -> Option<Self> {
         Some(self).filter(|jitter| objective.properties().marginalises || !jitter.is_default())
+    }
+}
+
+impl Default for OfStar {
+    fn default() -> Self {
+        NumberOr::Word(FittedStar)
     }
 }
 

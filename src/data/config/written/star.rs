@@ -1,6 +1,6 @@
 //! `star` and `instrument` as users write them. Doc comments here are the descriptions of the JSON Schema.
 
-use super::number_or::EquivalentWidth;
+use super::number_or::{EquivalentWidth, OfStar};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +49,29 @@ pub struct Star<Period = f64> {
     pub contrast: Option<f64>,
     /// The line of one surface element.
     pub line: Line,
+    /// Active regions: their line and limb contrast. Fitted if not given, with objective "marginal-likelihood";
+    /// otherwise a spot is a dimmed photosphere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub regions: Option<RegionsSection>,
+}
+
+/// Active regions, spots with the plages around them: their line and limb contrast. With `area`, `area_limb` and
+/// `dimming_limb` at 0 a spot is a dimmed photosphere.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RegionsSection {
+    /// Width of their line, before the spectrograph, over that of the photosphere's, 0.5 to 2.
+    pub line_width: OfStar,
+    /// Equivalent width of their line over that of the photosphere's, 0.3 to 3.
+    pub equivalent_width: OfStar,
+    /// Velocity of their line over that of the photosphere (km/s), positive to the red, -3 to 3.
+    pub shift_kms: OfStar,
+    /// Surface with their line per unit spot filling factor, 0 to 20.
+    pub area: OfStar,
+    /// Increase of that surface towards the limb: limb minus disc centre, -20 to 20.
+    pub area_limb: OfStar,
+    /// Limb dimming: one minus their brightness, limb minus disc centre, -3 to 3.
+    pub dimming_limb: OfStar,
 }
 
 /// Wavelength (nm) if none is given: that which LSD profiles of the visible are often normalised to.

@@ -1,0 +1,339 @@
+//! What the profiles say of the star itself: the numbers of its line and of active regions for which ln Z is largest,
+//! together with the field, which they change (`docs/method.md` section 9).
+//!
+//! ln Z is climbed by Newton's steps. Its gradient is one of differences, as the determinant counts; its second
+//! derivatives are those of the linearised model, improved from step to step. Harmonics up to a low degree do: they say
+//! the same of lines.
+
+use super::climb::{limits as limits_of_field, place as place_of_field};
+use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit, fit};
+use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
+use crate::model::{Parameter, ParameterValues};
+use crate::surface::imaging::Imager;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Degree of the harmonics.
+const DEGREE: usize = 18;
+
+/// A climb ends when a step would gain less than this in ln Z, or after so many.
+const GAIN: f64 = 0.1;
+const STEPS: usize = 12;
+
+/// Numbers of the field in a climb: ln amplitude, slope, ln lifetime, ln jitter.
+const OF_FIELD: usize = 4;
+
+/// Least surface of active regions per filling factor of spots that a climb goes down to.
+const LEAST_AREA: f64 = 0.02;
+
+/// Longest step in a number of the field, and in one of the star in standard deviations of its prior.
+const LONGEST: [f64; 2] = [0.5, 1.0];
+
+/// Second derivatives of the field that are not told otherwise, as for errors of 10 %.
+const USUAL_BEND: f64 = 100.0;
+
+/// A number that is fitted: its Gaussian prior, where a climb begins, and its bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StarPrior {
+    /// Which.
+    pub parameter: Parameter,
+    /// Mean of the prior.
+    pub mean: f64,
+    /// Standard deviation of the prior.
+    pub sd: f64,
+    /// Where a climb begins.
+    pub start: f64,
+    /// Bounds.
+    pub bounds: (f64, f64),
+}
+
+/// The most probable star.
+#[derive(Clone, Debug)]
+pub struct FittedStar {
+    /// All parameters, those that were fitted and those of the field among them.
+    pub values: ParameterValues,
+    /// Standard deviations of those that were fitted.
+    pub sd: Vec<f64>,
+    /// ln Z, with harmonics up to a low degree.
+    pub ln_evidence: f64,
+    /// ln of the prior density.
+    pub ln_prior: f64,
+}
+
+/// A point of a climb.
+struct Point {
+    place: DVector<f64>,
+    marginal: Marginal,
+    height: f64,
+}
+
+/// The way up.
+struct Climb<'a> {
+    imager: &'a Imager,
+    basis: Basis,
+    known: &'a Known,
+    priors: &'a [StarPrior],
+    free: [bool; OF_FIELD],
+    limits: Vec<(f64, f64)>,
+}
+
+/// The field of the star at `values` by harmonics up to a low degree.
+///
+/// # Errors
+/// [`NoFit`].
+pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
+    fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
+}
+
+/// Fits numbers of the star, beginning from the field of `near`.
+///
+/// # Errors
+/// [`FieldError`].
+pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPrior]) -> Result<FittedStar, FieldError> {
+    let assumed = near.marginal.assumed;
+    let area = |prior: &&StarPrior| prior.parameter == Parameter::RegionArea;
+    let area =
+        priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
+    let area = area.unwrap_or(1.0);
+    let ends = |prior: &StarPrior| match prior.parameter {
+        Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
+        _ => (f64::NEG_INFINITY, f64::INFINITY),
+    };
+    let limits = limits_of_field(known).into_iter().chain(priors.iter().map(ends)).collect();
+    let basis = Basis::coarse(&imager.grid, DEGREE);
+    let climb = Climb { imager, basis, known, priors, free: known.free(&assumed), limits };
+    let of_star = priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
+    let place =
+        DVector::from_iterator(OF_FIELD + priors.len(), place_of_field(&assumed).into_iter().copied().chain(of_star));
+    let first = climb.condensed_at(&place, &near.marginal, None)?;
+    climb.up(first)
+}
+
+/// The coordinate of a number of active regions in which the profiles are nearly linear: what their line changes goes
+/// with the surface that they cover.
+fn coordinate(parameter: Parameter, x: f64, area: f64) -> f64 {
+    match parameter {
+        Parameter::RegionLineWidth => area * (x * x - 1.0),
+        Parameter::RegionEquivalentWidth => area * (x - 1.0),
+        Parameter::RegionShift => area * x,
+        Parameter::RegionArea => x.ln(),
+        Parameter::RegionAreaLimb => x / area,
+        _ => x,
+    }
+}
+
+/// The number of active regions at a coordinate.
+fn number(parameter: Parameter, coordinate: f64, area: f64) -> f64 {
+    match parameter {
+        Parameter::RegionLineWidth => (1.0 + coordinate / area).max(0.0).sqrt(),
+        Parameter::RegionEquivalentWidth => 1.0 + coordinate / area,
+        Parameter::RegionShift => coordinate / area,
+        Parameter::RegionArea => coordinate.exp(),
+        Parameter::RegionAreaLimb => coordinate * area,
+        _ => coordinate,
+    }
+}
+
+impl Climb<'_> {
+    /// The star's numbers there.
+    fn numbers(&self, place: &DVector<f64>, values: &ParameterValues) -> Vec<f64> {
+        let of_star = || self.priors.iter().zip(place.iter().skip(OF_FIELD));
+        let inside = |prior: &StarPrior, x: f64| x.clamp(prior.bounds.0, prior.bounds.1);
+        let area = of_star().find(|(prior, _)| prior.parameter == Parameter::RegionArea);
+        let area = area.map(|(prior, x)| inside(prior, number(prior.parameter, *x, 1.0)));
+        let area = area.or(values.get(Parameter::RegionArea)).unwrap_or(1.0);
+        of_star().map(|(prior, x)| inside(prior, number(prior.parameter, *x, area))).collect()
+    }
+
+    /// A point, its profiles condensed to the numbers of those `near`.
+    fn at(&self, place: &DVector<f64>, near: &Marginal) -> Result<Point, FieldError> {
+        self.condensed_at(place, near, Some(&near.design))
+    }
+
+    fn condensed_at(&self, place: &DVector<f64>, near: &Marginal, like: Option<&Design>) -> Result<Point, FieldError> {
+        let mut values = near.values;
+        let numbers = self.numbers(place, &values);
+        self.priors.iter().zip(&numbers).for_each(|(prior, x)| values.set(prior.parameter, *x));
+        let assumed = self.assumed(place, &near.assumed);
+        let same_star = self.priors.iter().all(|prior| near.values.get(prior.parameter) == values.get(prior.parameter));
+        let design = match same_star && like.is_some() {
+            true => Arc::clone(&near.design),
+            false => {
+                let state = values.state();
+                Arc::new(Design::of(self.imager, &self.basis, (self.imager.response(&state), &state), like))
+            }
+        };
+        let marginal = Marginal::new(self.imager, &self.basis, design, values, assumed, Some(near))?;
+        let height = self.known.height(&marginal) + self.ln_prior(&numbers);
+        match height.is_finite() {
+            true => Ok(Point { place: place.clone(), marginal, height }),
+            false => Err(FieldError::NotPositive),
+        }
+    }
+
+    fn assumed(&self, place: &DVector<f64>, like: &Assumed) -> Assumed {
+        let lifetime = match like.field.kernel.lifetime {
+            Lifetime::Static => Lifetime::Static,
+            Lifetime::Days(_) => Lifetime::Days(place[2].exp()),
+        };
+        let field = Field {
+            spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1], ..like.field.spectrum },
+            kernel: Kernel { lifetime, ..like.field.kernel },
+        };
+        Assumed { field, jitter_kms: if like.jitter_kms == 0.0 { 0.0 } else { place[3].exp() } }
+    }
+
+    fn ln_prior(&self, numbers: &[f64]) -> f64 {
+        let off = |(prior, x): (&StarPrior, &f64)| -0.5 * ((x - prior.mean) / prior.sd).powi(2);
+        self.priors.iter().zip(numbers).map(off).sum()
+    }
+
+    /// How the star's numbers change with their coordinates.
+    fn jacobian(&self, at: &Point) -> DMatrix<f64> {
+        const H: f64 = 1e-4;
+        let count = self.priors.len();
+        let mut jacobian = DMatrix::zeros(count, count);
+        for i in 0..count {
+            let [above, below] = [H, -H].map(|h| {
+                let mut place = at.place.clone();
+                place[OF_FIELD + i] += h;
+                self.numbers(&place, &at.marginal.values)
+            });
+            for j in 0..count {
+                jacobian[(j, i)] = (above[j] - below[j]) / (2.0 * H);
+            }
+        }
+        jacobian
+    }
+
+    fn is_free(&self, i: usize) -> bool {
+        i >= OF_FIELD || self.free[i]
+    }
+
+    /// Minus the second derivatives: those of the linearised model at fixed maps, and of the priors.
+    fn bend(&self, at: &Point) -> Result<DMatrix<f64>, FieldError> {
+        let parameters: Vec<Parameter> = self.priors.iter().map(|prior| prior.parameter).collect();
+        let expansion = at.marginal.expansion(self.imager, &self.basis, &parameters)?;
+        let profiles = expansion.profiles();
+        let of_star = expansion.information.view((profiles, profiles), (parameters.len(), parameters.len()));
+        let mut of_star = of_star.into_owned();
+        self.priors.iter().enumerate().for_each(|(i, prior)| of_star[(i, i)] += prior.sd.powi(-2));
+        let jacobian = self.jacobian(at);
+        let of_star = jacobian.tr_mul(&of_star) * jacobian;
+        let mut bend = DMatrix::zeros(self.limits.len(), self.limits.len());
+        bend.view_mut((OF_FIELD, OF_FIELD), of_star.shape()).copy_from(&of_star);
+        (0..OF_FIELD).for_each(|i| bend[(i, i)] = USUAL_BEND);
+        Ok(bend)
+    }
+
+    /// The gradient, by central differences over steps that change the height by some half; and minus the second
+    /// derivatives along each number.
+    fn gradient(&self, at: &Point, bend: &DMatrix<f64>) -> (DVector<f64>, DVector<f64>) {
+        let along = |i: usize| {
+            if !self.is_free(i) {
+                return (0.0, bend[(i, i)]);
+            }
+            let h = bend[(i, i)].max(1e-6).sqrt().recip();
+            let beside = |h: f64| {
+                let mut place = at.place.clone();
+                place[i] = (place[i] + h).clamp(self.limits[i].0, self.limits[i].1.max(place[i]));
+                let moved = place[i] - at.place[i];
+                (moved != 0.0).then(|| self.at(&place, &at.marginal).ok().map(|there| (moved, there.height)))?
+            };
+            match (beside(h), beside(-h)) {
+                (Some((up, above)), Some((down, below))) => {
+                    let (a, b) = ((above - at.height) / up, (below - at.height) / down);
+                    let second = 2.0 * (b - a) / (up - down);
+                    // the slope here of the parabola through the three
+                    ((a * -down + b * up) / (up - down), second)
+                }
+                (Some((moved, there)), None) | (None, Some((moved, there))) => {
+                    ((there - at.height) / moved + 0.5 * bend[(i, i)] * moved, bend[(i, i)])
+                }
+                (None, None) => (0.0, bend[(i, i)]),
+            }
+        };
+        let all: Vec<(f64, f64)> = (0..self.limits.len()).into_par_iter().map(along).collect();
+        let of = |which: &dyn Fn(&(f64, f64)) -> f64| DVector::from_iterator(all.len(), all.iter().map(which));
+        (of(&|a| a.0), of(&|a| a.1))
+    }
+
+    fn up(&self, mut here: Point) -> Result<FittedStar, FieldError> {
+        let count = self.limits.len();
+        let mut bend = self.bend(&here)?;
+        let (mut gradient, mut along) = self.gradient(&here, &bend);
+        for step in 0..STEPS {
+            // as bent along each number as was seen
+            let scale = DVector::from_fn(count, |i, _| (along[i].max(0.05 * bend[(i, i)]) / bend[(i, i)]).sqrt());
+            bend.component_mul_assign(&(&scale * scale.transpose()));
+            let pushes = |i: usize| {
+                let (low, high) = self.limits[i];
+                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
+                    || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
+            };
+            let moves: Vec<bool> = (0..count).map(|i| self.is_free(i) && !pushes(i)).collect();
+            let among = DMatrix::from_fn(count, count, |i, j| match i == j {
+                true => bend[(i, i)].max(1e-6),
+                false if moves[i] && moves[j] => bend[(i, j)],
+                false => 0.0,
+            });
+            let inside = DVector::from_fn(count, |i, _| if moves[i] { gradient[i] } else { 0.0 });
+            let factor = among.clone().cholesky().or_else(|| DMatrix::from_diagonal(&among.diagonal()).cholesky());
+            let Some(mut way) = factor.map(|factor| factor.solve(&inside)) else { break };
+            let hoped = 0.5 * inside.dot(&way);
+            if std::env::var("DIMCMC_TRACE").is_ok() {
+                eprintln!(
+                    "{step} height {:.2} hoped {hoped:.2} place {:.3?} gradient {:.2?}",
+                    here.height,
+                    here.place.as_slice(),
+                    gradient.as_slice()
+                );
+            }
+            if hoped < GAIN {
+                break;
+            }
+            let longest = |i: usize| if i < OF_FIELD { LONGEST[0] } else { LONGEST[1] };
+            let too_far = (0..count).map(|i| way[i].abs() / longest(i)).fold(1.0, f64::max);
+            way /= too_far;
+            let Some(next) = self.shortened(&here, &way) else { break };
+            let moved = &next.place - &here.place;
+            let gained = next.height - here.height;
+            here = next;
+            if gained < 0.3 * GAIN {
+                break;
+            }
+            let (there, bends) = self.gradient(&here, &bend);
+            let bent = &gradient - &there;
+            let before = &bend * &moved;
+            if moved.dot(&bent) > 0.05 * moved.dot(&before) {
+                bend += &bent * bent.transpose() / moved.dot(&bent) - &before * before.transpose() / moved.dot(&before);
+            }
+            (gradient, along) = (there, bends);
+        }
+        let covariance = match bend.clone().cholesky() {
+            Some(factor) => factor.inverse(),
+            None => DMatrix::from_diagonal(&bend.diagonal().map(|bend| bend.max(1e-6).recip())),
+        };
+        let of_star = (OF_FIELD, self.priors.len());
+        let jacobian = self.jacobian(&here);
+        let covariance =
+            &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
+        let sd = covariance.diagonal().map(f64::sqrt);
+        let numbers = self.numbers(&here.place, &here.marginal.values);
+        let ln_prior = self.ln_prior(&numbers);
+        let sd = sd.iter().copied().collect();
+        Ok(FittedStar { values: here.marginal.values, sd, ln_evidence: here.marginal.ln_evidence(), ln_prior })
+    }
+
+    /// The first of ever shorter steps that leads up.
+    fn shortened(&self, here: &Point, way: &DVector<f64>) -> Option<Point> {
+        [1.0, 0.3, 0.1, 0.03].iter().find_map(|share| {
+            let place = DVector::from_fn(way.len(), |i, _| {
+                (here.place[i] + share * way[i]).clamp(self.limits[i].0, self.limits[i].1.max(here.place[i]))
+            });
+            let place = DVector::from_fn(way.len(), |i, _| if self.is_free(i) { place[i] } else { here.place[i] });
+            self.condensed_at(&place, &here.marginal, None).ok().filter(|next| next.height > here.height)
+        })
+    }
+}
