@@ -27,7 +27,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let same = |run: &&PathBuf| std::fs::canonicalize(run).ok() == std::fs::canonicalize(args.output.folder()).ok();
     if args.output.folder().exists() && args.runs.iter().any(|run| same(&run)) {
-        let problem = "is one of the runs: give a folder of its own";
+        let problem = "is one of the runs: give a new folder";
         return Err(Failure::input(format!("--out {}: {problem}", args.output.folder().display())));
     }
     let merged = merge(&args.runs).map_err(failure)?;

@@ -111,7 +111,7 @@ fn what_nobody_knows_is_marked_and_refused_later() {
     assert_eq!(desk.json("a.json")["star"]["rotation_period_d"], Value::Null);
     for command in ["map", "periodogram", "optimise", "sample"] {
         let message = desk.refusal(&[command, "a.json", "--out", "out"]);
-        says(&message, &["a.json: star.rotation_period_d: null stands for a value still to be given: put a number"]);
+        says(&message, &["a.json: star.rotation_period_d: null marks a missing value: give a number"]);
     }
     desk.edit("a.json", |text| text.replace("null", "3.0"));
     desk.succeed(&["map", "a.json", "--out", "out"]);

@@ -210,8 +210,8 @@ fn one_band<'a>(columns: &Columns, cells: impl Iterator<Item = &'a str>) -> Resu
             let name = columns.band.map(|band| columns.name(band)).unwrap_or_default();
             let named = bands.into_iter().collect::<Vec<_>>().join(", ");
             let problem = format!(
-                "column {name} has several: {named}. A light curve is of one band: give each a table of its own, \
-                 listed in photometry"
+                "column {name} has several: {named}. A light curve is of one band: give one table per band, listed \
+                in photometry"
             );
             Err((0, problem))
         }

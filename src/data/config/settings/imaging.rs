@@ -71,7 +71,7 @@ fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
             continuously; for one map per season set \"spottedness\"";
             return Err(Fault::new(key, problem));
         }
-        ([Some(_), Some(key)], _) => return Err(Fault::new(key, "stands in place of season_gap_d: give one of them")),
+        ([Some(_), Some(key)], _) => return Err(Fault::new(key, "replaces season_gap_d: give one of them")),
         _ => {}
     }
     if let Some(gap) = gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {

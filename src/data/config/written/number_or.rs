@@ -20,15 +20,14 @@ pub enum NumberOr<W> {
 pub type Automatic = NumberOr<Auto>;
 /// Equivalent width of the local line; automatic: the mean area of the observed profiles.
 pub type EquivalentWidth = Automatic;
-/// Standard deviation of the velocity zero points of the profiles (km/s), 0 for none; fitted: what the profiles say, at
-/// the config's values.
+/// RV jitter of the profiles (km/s), 0 for none; fitted: fitted to the profiles, at the config's values.
 pub type VelocityJitter = NumberOr<FittedJitter>;
-/// Velocity that all profiles of a data set have too much (km/s), 0 for none; fitted: integrated out.
+/// RV offset of a data set (km/s), 0 for none; fitted: marginalised over.
 pub type ZeroPoint = NumberOr<FittedOffset>;
-/// A hyperparameter of the field of spots; fitted: that for which the profiles are most probable.
+/// A hyperparameter of the field of spots; fitted: at the maximum of the marginal likelihood.
 pub type Hyperparameter = NumberOr<OfField>;
 
-/// A number of the star; fitted: that for which the profiles are most probable.
+/// A number of the star; fitted: at the maximum of the marginal likelihood.
 pub type OfStar = NumberOr<FittedStar>;
 
 /// "fitted", of a number of the star.
@@ -108,7 +107,7 @@ impl Word for FittedStar {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedStar)];
     const EXPECTED: &'static str = "a number or \"fitted\"";
     const SCHEMA: [&'static str; 2] =
-        ["FittedStar", "A number, or \"fitted\": that for which the profiles are most probable."];
+        ["FittedStar", "A number, or \"fitted\": at the maximum of the marginal likelihood."];
 
     fn bounds() -> Value {
         json!({})
