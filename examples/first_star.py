@@ -83,7 +83,7 @@ search.figure()
 
 # %%
 k, error = search.summary.best.k_kms, search.summary.best.sigma_k_kms
-print(f"K = {1000 * k:.0f} +- {1000 * error:.0f} m/s, {1000 * config.planet.k_kms:.0f} m/s were put in")
+print(f"K = {1000 * k:.0f} +- {1000 * error:.0f} m/s, {1000 * config.planet.k_kms:.0f} m/s were injected")
 
 # %% [markdown]
 # ## The posterior
