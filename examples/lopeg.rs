@@ -137,7 +137,7 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
 fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     let (mut near, mut covered, mut all) = (0, 0, 0);
     println!(
-        "| injected K | Porb/Prot | phi | K found | 95 % | minus null, along the orbit | in errors | across, in errors |"
+        "| K injected | Porb/Prot | phi | found | 95 % | minus null, along the orbit | in errors | across, in errors |"
     );
     println!("|---|---|---|---|---|---|---|---|");
     for period in PERIODS {
