@@ -106,7 +106,12 @@ fn what_nobody_knows_is_marked_and_refused_later() {
     let table = desk.succeed(&["init", "data/observations.txt", "--out", "a.json"]);
     says(
         &table,
-        &["still to be given\n", "star.rotation_period_d", "null", "note: without a rotation period no command"],
+        &[
+            "still to be given\n",
+            "star.rotation_period_d",
+            "null",
+            "note: missing rotation period: other commands refuse",
+        ],
     );
     assert_eq!(desk.json("a.json")["star"]["rotation_period_d"], Value::Null);
     for command in ["map", "periodogram", "optimise", "sample"] {
@@ -199,7 +204,7 @@ fn a_continuum_that_is_not_at_one_is_recognised() {
         &[
             "observations.continuum_level",
             "0.97",
-            "the continuum beside the line is there",
+            "level of the continuum beside the line",
             "test fit: a brightness that varies by",
         ],
     );
@@ -235,10 +240,7 @@ fn continua_that_wander_are_let() {
     let desk = desk();
     with_intensities(&desk, |k, intensity| intensity + 0.006 * (7.3 * k as f64 * k as f64).sin() - 0.01);
     let table = desk.succeed(&INIT);
-    says(
-        &table,
-        &["imaging.nuisances.continuum_offset", "more than their noise explains", "observations.continuum_level"],
-    );
+    says(&table, &["imaging.nuisances.continuum_offset", "above the noise", "observations.continuum_level"]);
     let config = desk.json("star.json");
     // 0.006 times the standard deviation of a sine
     assert!((0.003..0.007).contains(&number(&config, "/imaging/nuisances/continuum_offset")), "{config}");
@@ -280,7 +282,7 @@ fn a_vsini_of_another_star_is_put_right() {
     says(
         &table,
         &[
-            "note: vsini is given as 45 km/s, the mean profile looks like 2",
+            "note: the given vsini is 45 km/s, the mean profile suggests 2",
             "note: maps fit much better with the vsini of the mean profile than with the given one: 2",
             "next:\n  dimcmc map star.json",
         ],
@@ -357,7 +359,7 @@ fn continua_that_are_tilted_are_let() {
     let desk = desk();
     with_rows(&desk, |_, v, i, s| (i * (1.0 + 2e-4 * v), s));
     let table = desk.succeed(&INIT);
-    says(&table, &["imaging.nuisances.continuum_slope", "more than their noise explains", "test fit: evolving maps"]);
+    says(&table, &["imaging.nuisances.continuum_slope", "above the noise", "test fit: evolving maps"]);
     let config = desk.json("star.json");
     let range = &config["observations"]["velocity_range_kms"];
     let expected = 1e-4 * (range[1].as_f64().unwrap() - range[0].as_f64().unwrap());

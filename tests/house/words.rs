@@ -101,13 +101,14 @@ fn house_words(text: &str) -> Vec<(&'static str, &'static str)> {
 
 /// Text without what stands between `open` and `close`.
 fn without(text: &str, open: &str, close: &str) -> String {
-    let mut parts = text.split(open);
-    let mut kept = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
+    let mut kept = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once(open) {
+        kept += before;
         kept += " ";
-        kept += part.split_once(close).map_or("", |(_, rest)| rest);
+        rest = after.split_once(close).map_or("", |(_, after)| after);
     }
-    kept
+    kept + rest
 }
 
 /// Paragraphs of a page, and what the program prints on it.

@@ -121,7 +121,7 @@ fn meanings(found: &QuantitiesRecord) -> String {
 }
 
 fn eccentric(orbit: &KeplerianRecord) -> String {
-    let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" +- {x:.digits$}"));
+    let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" ± {x:.digits$}"));
     let mut text = format!(
         "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circular orbit\n",
         orbit.eccentricity,
@@ -132,7 +132,7 @@ fn eccentric(orbit: &KeplerianRecord) -> String {
     );
     for quantity in OrbitQuantity::ALL {
         if let Some((value, Some(sigma))) = orbit.quantities.of(quantity) {
-            text += &format!("  its {}: {value:.1$} +- {sigma:.1$}\n", quantity.name(), decimals(sigma));
+            text += &format!("  its {}: {value:.1$} ± {sigma:.1$}\n", quantity.name(), decimals(sigma));
         }
     }
     text
@@ -149,7 +149,10 @@ fn robustness(found: &RobustnessRecord) -> String {
         let short = if at.reached { "" } else { " (not reached)" };
         row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
     }));
-    let without = |night: &NightRecord| format!("without night {:.2}, {} profiles", night.first_time_d, night.profiles);
+    let without = |night: &NightRecord| {
+        let plural = if night.profiles == 1 { "" } else { "s" };
+        format!("without night {:.2}, {} profile{plural}", night.first_time_d, night.profiles)
+    };
     rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
     aligned(&rows)
 }

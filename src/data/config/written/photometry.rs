@@ -54,10 +54,10 @@ pub struct PhotometrySection {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutlierTreatment {
-    /// Rejected, counted and named.
+    /// Outliers are rejected, counted and named.
     #[default]
     LeaveOut,
-    /// Kept.
+    /// Outliers are kept.
     Keep,
 }
 
