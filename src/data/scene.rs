@@ -9,7 +9,7 @@ use crate::data::dataset::{Dataset, in_memory};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::inference::evidence::EvidenceRecord;
 use crate::inference::search::{self, Found, Progress, SearchError, SearchSettings};
-use crate::model::{FreeParameter, ParameterSpace, ParameterValues};
+use crate::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
@@ -129,9 +129,11 @@ impl Scene {
     #[must_use]
     #[doc(hidden)]
     pub fn with_star(mut self, star: MeasuredStar) -> Self {
-        star.put_into(&mut self.imager.star);
-        let is_free = |parameter| self.settings.free.iter().any(|free| free.parameter == parameter);
-        star.set(&mut self.settings.values, is_free);
+        star.put_into(&mut self.imager);
+        let in_values = |parameter: Parameter| {
+            !parameter.is_surface() || self.settings.free.iter().any(|free| free.parameter == parameter)
+        };
+        star.set(&mut self.settings.values, in_values);
         self.space = space(&self.settings.free, &self.settings, &self.imager);
         self.measured.star = Some(star);
         self

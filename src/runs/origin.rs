@@ -199,12 +199,14 @@ impl Origin {
     /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
     pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Density, OriginError> {
         let (surface, mut imager) = (scene.surface().model(), scene.imager.clone());
-        self.measured.star.iter().for_each(|star| star.put_into(&mut imager.star));
-        surface.rebuilt(imager, space, &self.reference, &scene.settings.values).map_err(|error| match error {
-            RebuildError::Differs { what, then, now } => {
-                OriginError::Irreproducible { folder: folder.into(), what, then, now }
+        self.measured.star.iter().for_each(|star| star.put_into(&mut imager));
+        surface.rebuilt(imager, space, &self.reference, &scene.settings.values).map_err(|error| {
+            match error {
+                RebuildError::Differs { what, then, now } => {
+                    OriginError::Irreproducible { folder: folder.into(), what, then, now }
+                }
+                other => OriginError::Reference(other),
             }
-            other => OriginError::Reference(other),
         })
     }
 }

@@ -17,7 +17,7 @@ use crate::star::{
 use crate::surface::nuisances::{LineAndContinuum, Nuisances};
 use crate::surface::photometry::LightCurve;
 
-use nalgebra::DMatrix;
+use nalgebra::DVector;
 
 pub use data::Data;
 pub use problem::ImagingProblem;
@@ -61,6 +61,56 @@ pub struct Imager {
     pub zero_points: Vec<ZeroPointPrior>,
     /// Light curves beside the profiles, of which only integrated maps know; mostly none.
     pub light_curves: Vec<LightCurve>,
+    /// Standard deviation of what is wrong alike in all profiles of a data set (continuum 1), of which only integrated
+    /// maps know; 0 for none.
+    pub mean_profile: f64,
+    /// A drift of the velocities, of which only integrated maps know.
+    pub drift: Option<Drift>,
+}
+
+/// A drift of the velocities: a polynomial in time, around the middle of the data, with Gaussian priors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// Middle of the data (d).
+    pub mid_d: f64,
+    /// Half of their span (d).
+    pub half_span_d: f64,
+    /// Whether there is a curvature beside the slope.
+    pub curved: bool,
+}
+
+/// Standard deviation of the prior of a drift: of the velocity (km/s) at the end of the data over that in the middle.
+pub const DRIFT_KMS: f64 = 0.5;
+
+impl Drift {
+    /// Of data taken at these times (d); `None` where they are one.
+    pub fn of(times_d: &[f64], curved: bool) -> Option<Self> {
+        let ends = times_d.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+        let (mid_d, half_span_d) = (0.5 * (ends.0 + ends.1), 0.5 * (ends.1 - ends.0));
+        (half_span_d > 0.0 && half_span_d.is_finite()).then_some(Drift { mid_d, half_span_d, curved })
+    }
+
+    /// Number of its terms.
+    pub fn terms(&self) -> usize {
+        if self.curved { 2 } else { 1 }
+    }
+
+    /// Velocities at a time (d) by one km/s of each term.
+    fn at(&self, time_d: f64) -> [f64; 2] {
+        let x = (time_d - self.mid_d) / self.half_span_d;
+        [x, x * x - 1.0 / 3.0]
+    }
+}
+
+/// A velocity that several profiles have in common, with a Gaussian prior.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommonVelocity {
+    /// How much of it each coordinate of an expansion has.
+    pub of_each: DVector<f64>,
+    /// Mean of the prior (km/s).
+    pub mean_kms: f64,
+    /// Standard deviation of the prior (km/s).
+    pub sd_kms: f64,
 }
 
 impl Imager {
@@ -76,6 +126,8 @@ impl Imager {
             entropy,
             zero_points: Vec::new(),
             light_curves: Vec::new(),
+            mean_profile: 0.0,
+            drift: None,
         }
     }
 
@@ -159,13 +211,26 @@ impl Imager {
         self.zero_points[z].mean_kms -= kms;
     }
 
-    /// How RV offsets change the coordinates of an expansion, the velocities of all profiles first: a column each.
-    pub fn offset_columns(&self, coordinates: usize) -> DMatrix<f64> {
-        let mut columns = DMatrix::zeros(coordinates, self.zero_points.len());
-        for (mut column, prior) in columns.column_iter_mut().zip(&self.zero_points) {
-            self.profiles_of(prior.set).for_each(|k| column[k] = 1.0);
+    /// The velocities that are integrated out beside those of profiles: RV offsets of data sets, and then the drift; for
+    /// so many coordinates of an expansion, of which the velocities of all profiles come first.
+    pub fn common_velocities(&self, coordinates: usize) -> Vec<CommonVelocity> {
+        let offset = |prior: &ZeroPointPrior| {
+            let mut of_each = DVector::zeros(coordinates);
+            self.profiles_of(prior.set).for_each(|k| of_each[k] = 1.0);
+            CommonVelocity { of_each, mean_kms: prior.mean_kms, sd_kms: prior.sd_kms }
+        };
+        let mut all: Vec<CommonVelocity> = self.zero_points.iter().map(offset).collect();
+        for (drift, term) in self.drift.iter().flat_map(|drift| (0..drift.terms()).map(move |term| (drift, term))) {
+            let mut of_each = DVector::zeros(coordinates);
+            self.times_d().iter().enumerate().for_each(|(k, time_d)| of_each[k] = drift.at(*time_d)[term]);
+            all.push(CommonVelocity { of_each, mean_kms: 0.0, sd_kms: DRIFT_KMS });
         }
-        columns
+        all
+    }
+
+    /// Whether there are such velocities.
+    pub fn has_common_velocities(&self) -> bool {
+        !self.zero_points.is_empty() || self.drift.is_some()
     }
 
     /// Number of each profile's data set, from 1; empty where there is only one.

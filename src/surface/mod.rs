@@ -20,6 +20,7 @@ pub mod evolving_map;
 pub mod expansion;
 pub mod imaging;
 mod linearised;
+pub mod mean_profile;
 pub mod maps;
 mod model;
 pub mod nuisances;
@@ -36,7 +37,7 @@ pub mod planned {
     pub use super::evolving_map::{Assumed, Basis, Marginal, Planned, fit};
 }
 
-pub use constants::{ConstantVelocity, Constants};
+pub use constants::{ConstantVelocity, Constants, FoundDrift};
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};

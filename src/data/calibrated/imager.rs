@@ -3,7 +3,7 @@
 
 use super::seasons::with_seasons;
 use super::strength::star_for;
-use crate::data::config::{ConfigError, DataSetSettings, Settings, ZeroPoint};
+use crate::data::config::{ConfigError, DataSetSettings, Settings, VelocityDrift, ZeroPoint};
 use crate::data::io::provenance::Season;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::observation::Observations;
@@ -11,7 +11,7 @@ use crate::star::{Sampling, Seen, StarSettings};
 use crate::surface::calibration::offsets;
 use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::expansion::nuisances;
-use crate::surface::imaging::{Imager, ZeroPointPrior};
+use crate::surface::imaging::{Drift, Imager, ZeroPointPrior};
 
 /// What the observations `parts` of these data `sets` are imaged with, with a map of each of the `seasons`. An offset
 /// that is to be found is at 0.
@@ -44,6 +44,10 @@ pub fn imager(
         let priors = sets.iter().map(|set| set.nuisances.unwrap_or_default());
         imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
     }
+    imager.drift = match settings.drift {
+        VelocityDrift::None => None,
+        drift => Drift::of(&imager.times_d(), drift == VelocityDrift::Quadratic),
+    };
     for (set, DataSetSettings { zero_point, .. }) in sets.iter().enumerate() {
         match *zero_point {
             ZeroPoint::Number(0.0) => {}

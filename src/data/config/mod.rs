@@ -23,7 +23,7 @@ pub use settings::{
 pub use written::{
     Automatic, EquivalentWidth, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line,
     LineShape, Listed, ObservationsSection, OfField, OutlierTreatment, PhotometrySection, PlanSection, SEGMENT_GAP_D,
-    SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM, VelocityJitter, ZeroPoint,
+    SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM, VelocityDrift, VelocityJitter, ZeroPoint,
 };
 
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.

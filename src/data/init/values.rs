@@ -185,6 +185,8 @@ impl Values {
                 gamma_kms,
                 equivalent_width_kms: equivalent_width(cuts, known, ledger),
             },
+            fitted: Vec::new(),
+            velocity_drift: None,
             regions: None,
         };
         let imaging = imaging(known, ledger);

@@ -11,7 +11,7 @@ use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{CircularOrbit, KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::surface::{AtTarget, Change, ConstantVelocity, OtherRotation, SpotField};
+use crate::surface::{AtTarget, Change, ConstantVelocity, FoundDrift, OtherRotation, SpotField};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -60,6 +60,9 @@ pub struct PeriodogramFile {
     /// errors do not have its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub systemic_velocity: Option<ConstantVelocity>,
+    /// Drift of the velocities beside the best orbit, where one is integrated out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift: Option<FoundDrift>,
     /// What is lost where the orbit turns with the star.
     pub co_rotation: CoRotationRecord,
     /// Whether the best orbit hangs on a choice.
@@ -362,6 +365,7 @@ impl PeriodogramFile {
             },
             offset: found.offset,
             systemic_velocity: search.constants.as_ref().and_then(|constants| constants.systemic),
+            drift: search.constants.as_ref().and_then(|constants| constants.drift),
             co_rotation: CoRotationRecord {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),

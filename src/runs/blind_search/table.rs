@@ -30,6 +30,9 @@ impl PeriodogramFile {
                 uncertainty is not in rv_sigma_kms)\n"
             );
         }
+        if let Some(drift) = &self.drift {
+            text += &format!("{}\n", drift.line());
+        }
         text += &format!("{}\n", chance(&self.false_alarm));
         if let Some(evidence) = &self.evidence {
             text += &format!("evidence: {}\n", evidence.sentence);

@@ -6,7 +6,7 @@
 //! sections 2 and 3). They are wide: regions of other stars are stronger.
 
 use crate::model::{Parameter, ParameterValues};
-use crate::star::StarSettings;
+use crate::star::LocalLine;
 use crate::surface::Known;
 use crate::surface::evolving_map::NoFit;
 use crate::surface::evolving_map::star::{FittedStar, StarPrior, coarsely, fit_star};
@@ -22,6 +22,33 @@ const PRIORS: [(Parameter, f64, f64, f64); Parameter::REGIONS.len()] = [
     (Parameter::RegionAreaLimb, 0.0, 2.0, 0.0),
     (Parameter::RegionDimmingLimb, 0.0, 0.7, 0.0),
 ];
+
+/// Widths of the priors of line and vsini around what the config says: shares of it, km/s.
+const OF_LINE: f64 = 0.4;
+const OF_STRENGTH: f64 = 0.15;
+const OF_VSINI: (f64, f64) = (0.04, 1.0);
+const OF_LIMB_DARKENING: f64 = 0.15;
+
+/// The prior of a number of the star that is `value` by the config.
+fn prior(parameter: Parameter, value: f64) -> StarPrior {
+    let (low, high) = parameter.widest();
+    let of = |mean: f64, sd: f64, start: f64| StarPrior { parameter, mean, sd, start, bounds: (low, high) };
+    match parameter {
+        Parameter::LineSigma => StarPrior { bounds: (0.2 * value, 5.0 * value), ..of(value, OF_LINE * value, value) },
+        Parameter::EquivalentWidth => {
+            StarPrior { bounds: (0.3 * value, 3.0 * value), ..of(value, OF_STRENGTH * value, value) }
+        }
+        Parameter::Vsini => {
+            let sd = OF_VSINI.1.max(OF_VSINI.0 * value);
+            StarPrior { bounds: (0.3 * value, 3.0 * value), ..of(value, sd, value) }
+        }
+        Parameter::LimbDarkening => of(value, OF_LIMB_DARKENING, value.clamp(0.02, 0.98)),
+        _ => {
+            let of_regions = PRIORS.iter().find(|(of, ..)| *of == parameter);
+            of_regions.map_or(of(value, 1.0, value), |&(_, mean, sd, start)| of(mean, sd, start))
+        }
+    }
+}
 
 /// Regions have to gain so much in ln Z, what their numbers are free to be counted against them.
 const NEEDED: f64 = 5.0;
@@ -42,7 +69,10 @@ pub struct FittedNumber {
 pub struct MeasuredStar {
     /// What was fitted; nothing where spots that are the photosphere, dimmed, explain the profiles as well.
     pub numbers: Vec<FittedNumber>,
-    /// What that gains in ln Z.
+    /// Size of what is wrong alike in all profiles of a data set, over the continuum; 0 for nothing.
+    #[serde(default)]
+    pub mean_profile: f64,
+    /// What all of it gains in ln Z.
     pub gain: f64,
 }
 
@@ -54,30 +84,37 @@ impl MeasuredStar {
     pub fn of(imager: &Imager, mut values: ParameterValues, known: Known, fitted: &[Parameter]) -> Result<Self, NoFit> {
         values.set(Parameter::K, 0.0);
         let plain = coarsely(imager, values, known)?;
-        let priors: Vec<StarPrior> = PRIORS
-            .iter()
-            .filter(|(parameter, ..)| fitted.contains(parameter))
-            .map(|&(parameter, mean, sd, start)| StarPrior { parameter, mean, sd, start, bounds: parameter.widest() })
-            .collect();
-        let FittedStar { values, sd, ln_evidence, ln_prior } = fit_star(imager, &plain, &known, &priors)?;
+        let star = imager.star.with(&values.surface);
+        let value = |parameter: Parameter| match parameter {
+            Parameter::LineSigma => {
+                let LocalLine { sigma_kms, instrumental_sigma_kms, .. } = star.line;
+                (sigma_kms.powi(2) - instrumental_sigma_kms.powi(2)).max(0.0).sqrt()
+            }
+            Parameter::EquivalentWidth => star.line.strength_kms(),
+            Parameter::LimbDarkening => star.limb_darkening.coefficients().0,
+            _ => values.get(parameter).unwrap_or(0.0),
+        };
+        let priors: Vec<StarPrior> = fitted.iter().map(|parameter| prior(*parameter, value(*parameter))).collect();
+        let FittedStar { values, sd, mean_profile, ln_evidence, ln_prior } = fit_star(imager, &plain, &known, &priors)?;
         let told: f64 = sd.iter().zip(&priors).map(|(sd, prior)| (sd / prior.sd).min(1.0).ln()).sum();
         let gain = ln_evidence - plain.ln_evidence;
         if gain + ln_prior + told < NEEDED {
-            return Ok(MeasuredStar { numbers: Vec::new(), gain });
+            return Ok(MeasuredStar { gain, ..MeasuredStar::default() });
         }
         let number = |(prior, sigma): (&StarPrior, &f64)| FittedNumber {
             name: prior.parameter.name().to_owned(),
             value: values[prior.parameter],
             sigma: *sigma,
         };
-        Ok(MeasuredStar { numbers: priors.iter().zip(&sd).map(number).collect(), gain })
+        Ok(MeasuredStar { numbers: priors.iter().zip(&sd).map(number).collect(), mean_profile, gain })
     }
 
-    /// Puts what was found into a star.
-    pub fn put_into(&self, star: &mut StarSettings) {
+    /// Puts what was found into what profiles are imaged with.
+    pub fn put_into(&self, imager: &mut Imager) {
         let mut values = ParameterValues::of_eight([0.0; 8]);
         self.set(&mut values, |_| true);
-        *star = star.with(&values.surface);
+        imager.star = imager.star.with(&values.surface);
+        imager.mean_profile = self.mean_profile;
     }
 
     /// Sets the parameters that are free to what was found: where searches begin.
@@ -91,7 +128,7 @@ impl MeasuredStar {
 
     /// It in words.
     pub fn line(&self) -> String {
-        let MeasuredStar { numbers, gain } = self;
+        let MeasuredStar { numbers, mean_profile, gain } = self;
         if numbers.is_empty() {
             return format!("as the photosphere, dimmed (a line of their own gains {gain:.1} in ln Z)");
         }
@@ -100,6 +137,10 @@ impl MeasuredStar {
             format!("{name} {value:.2} +- {sigma:.2}")
         };
         let all: Vec<String> = numbers.iter().map(of).collect();
-        format!("{} (gain {gain:.0} in ln Z)", all.join(", "))
+        let mean = match mean_profile {
+            0.0 => String::new(),
+            size => format!(", mean profile {:.2} %", 100.0 * size),
+        };
+        format!("{}{mean} (gain {gain:.0} in ln Z)", all.join(", "))
     }
 }

@@ -8,6 +8,7 @@ use crate::field::{Compression, Spectrum, leading_directions, with_directions};
 use crate::star::{Response, StarState};
 use crate::surface::expansion::VELOCITY_STEP_KMS;
 use crate::surface::imaging::Imager;
+use crate::surface::mean_profile;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -26,6 +27,8 @@ pub(super) struct Condensed {
     pub data: Vec<DVector<f64>>,
     /// Nuisances of line and continuum (numbers, nuisances).
     pub nuisances: Vec<DMatrix<f64>>,
+    /// What may be wrong alike in all profiles, for a size of 1 (numbers, columns); no columns where nothing may.
+    pub mean_profile: Vec<DMatrix<f64>>,
     /// ln of the density of what is left of the bins.
     pub beside: Vec<f64>,
 }
@@ -42,6 +45,7 @@ impl Condensed {
     ) -> Self {
         let sd: Vec<f64> = ROUGHEST.variances(&basis.degrees).into_iter().map(f64::sqrt).collect();
         let slopes = bare_slopes(imager, response, state);
+        let wrong_alike = if imager.mean_profile > 0.0 { mean_profile::columns(imager) } else { Vec::new() };
         let of_profile = |k: usize| {
             let (bins, data) = (response.bins(k), &imager.data);
             let weights = data.inverse_variance[bins.clone()].iter().map(|w| w.sqrt());
@@ -58,7 +62,12 @@ impl Condensed {
             let directions =
                 leading_directions(&rough * rough.transpose(), Compression { left_out: LEFT_OUT }).unwrap_or_else(all);
             let own = DMatrix::from_columns(&[weighed(bare), weighed(&slopes)]);
-            let directions = with_directions(with_directions(directions, &own), &nuisances);
+            let mut directions = with_directions(with_directions(directions, &own), &nuisances);
+            let mut alike = wrong_alike.get(k).cloned().unwrap_or_else(|| DMatrix::zeros(bins.len(), 0));
+            alike.column_iter_mut().for_each(|mut column| column.component_mul_assign(&weights));
+            if alike.ncols() > 0 {
+                directions = with_directions(directions, &alike);
+            }
             let depths = weighed(&data.depth);
             let told = directions.transpose() * &depths;
             let rest = depths.norm_squared() - told.norm_squared();
@@ -66,14 +75,16 @@ impl Condensed {
             let beside = weights.iter().map(|w| w.ln()).sum::<f64>() - 0.5 * (rest + left * TAU.ln());
             let mut rows = directions.transpose();
             rows.row_iter_mut().for_each(|mut row| row.component_mul_assign(&weights.transpose()));
-            (rows, told, directions.transpose() * nuisances, beside)
+            (rows, told, directions.transpose() * nuisances, directions.transpose() * alike, beside)
         };
         let all: Vec<_> = (0..response.profiles()).into_par_iter().map(of_profile).collect();
-        let mut condensed = Condensed { rows: vec![], data: vec![], nuisances: vec![], beside: vec![] };
-        for (rows, data, nuisances, beside) in all {
+        let mut condensed =
+            Condensed { rows: vec![], data: vec![], nuisances: vec![], mean_profile: vec![], beside: vec![] };
+        for (rows, data, nuisances, mean_profile, beside) in all {
             condensed.rows.push(rows);
             condensed.data.push(data);
             condensed.nuisances.push(nuisances);
+            condensed.mean_profile.push(mean_profile);
             condensed.beside.push(beside);
         }
         condensed

@@ -107,13 +107,43 @@ impl Design {
     pub fn epochs(&self, imager: &Imager, maps: &DMatrix<f64>) -> Vec<Epoch> {
         let times_d = imager.times_d();
         let profiles = self.response.profiles();
-        let mut epochs: Vec<Epoch> =
-            (0..profiles).into_par_iter().map(|k| self.epoch(times_d[k], k, &maps.column(k).into_owned())).collect();
+        let epoch = |k: usize| self.epoch((times_d[k], imager.mean_profile), k, &maps.column(k).into_owned());
+        let mut epochs: Vec<Epoch> = (0..profiles).into_par_iter().map(epoch).collect();
         epochs.extend(self.light.epochs(imager, maps.columns_range(profiles..)));
+        // numbers of profiles first, then those of light curves
+        let of_profiles = epochs.first().map_or(0, |epoch| epoch.common.ncols());
+        let of_light = epochs.get(profiles).map_or(0, |epoch| epoch.common.ncols());
+        if of_profiles > 0 && of_light > 0 {
+            for (k, epoch) in epochs.iter_mut().enumerate() {
+                let common = std::mem::replace(&mut epoch.common, DMatrix::zeros(0, 0));
+                epoch.common = match k < profiles {
+                    true => common.resize_horizontally(of_profiles + of_light, 0.0),
+                    false => common.insert_columns(0, of_profiles, 0.0),
+                };
+            }
+        }
         epochs
     }
 
-    fn epoch(&self, time_d: f64, k: usize, coefficients: &DVector<f64>) -> Epoch {
+    /// What is wrong alike in all profiles, most probable for maps of these coefficients (H, epochs): a number for each
+    /// of the columns of [`mean_profile`](crate::surface::mean_profile); none where nothing may be.
+    pub(super) fn mean_profile(&self, imager: &Imager, maps: &DMatrix<f64>) -> DVector<f64> {
+        let epochs = &self.epochs(imager, maps)[..self.response.profiles()];
+        let numbers = self.condensed.mean_profile.first().map_or(0, DMatrix::ncols);
+        let (mut inner, mut along) = (DMatrix::identity(numbers, numbers), DVector::zeros(numbers));
+        for (epoch, alike) in epochs.iter().zip(&self.condensed.mean_profile) {
+            let alike = alike * imager.mean_profile;
+            // numbers are in units of the noise; nuisances of the profile take what they may
+            let mut noise = &epoch.nuisances * epoch.nuisances.transpose();
+            (0..noise.nrows()).for_each(|i| noise[(i, i)] += 1.0);
+            let Some(factor) = noise.cholesky() else { continue };
+            inner += alike.tr_mul(&factor.solve(&alike));
+            along += alike.tr_mul(&factor.solve(&epoch.misfit));
+        }
+        inner.cholesky().map_or(DVector::zeros(numbers), |factor| factor.solve(&along)) * imager.mean_profile
+    }
+
+    fn epoch(&self, (time_d, mean_profile): (f64, f64), k: usize, coefficients: &DVector<f64>) -> Epoch {
         let (model, continuum) = self.depths(k, coefficients);
         let scale = -(1.0 - self.response.contrast(k)) / continuum;
         let divisor = self.continuum.column(k) * scale;
@@ -123,7 +153,7 @@ impl Design {
             jacobian,
             variance: DVector::repeat(model.len(), 1.0),
             slopes: DMatrix::zeros(model.len(), 0),
-            common: DMatrix::zeros(model.len(), 0),
+            common: &self.condensed.mean_profile[k] * mean_profile,
             divisor,
             misfit: &self.condensed.data[k] - model,
             nuisances: self.condensed.nuisances[k].clone(),

@@ -5,7 +5,7 @@ use crate::field::{FieldError, Quadratic};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::Response;
 use crate::surface::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
-use crate::surface::imaging::{Imager, ZeroPointPrior};
+use crate::surface::imaging::{CommonVelocity, Imager};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -69,14 +69,13 @@ impl Marginal {
         stellar: &[Parameter],
         quadratic: Quadratic,
     ) -> Result<Expansion, FieldError> {
-        if imager.zero_points.is_empty() {
+        if !imager.has_common_velocities() {
             return Ok(self.expanded(imager, stellar, quadratic));
         }
-        let of_each = |number: &dyn Fn(&ZeroPointPrior) -> f64| {
-            DVector::from_iterator(imager.zero_points.len(), imager.zero_points.iter().map(number))
-        };
-        let (mean, sd) = (of_each(&|prior| prior.mean_kms), of_each(&|prior| prior.sd_kms));
-        let columns = imager.offset_columns(quadratic.gradient.len());
+        let common = imager.common_velocities(quadratic.gradient.len());
+        let columns = DMatrix::from_columns(&common.iter().map(|one| one.of_each.clone()).collect::<Vec<_>>());
+        let of_each = |number: fn(&CommonVelocity) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
+        let (mean, sd) = (of_each(|one| one.mean_kms), of_each(|one| one.sd_kms));
         let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
         Ok(self.expanded(imager, stellar, quadratic))
     }
@@ -99,9 +98,9 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
-        match imager.zero_points.is_empty() {
-            true => Ok(self.ln_evidence()),
-            false => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
+        match imager.has_common_velocities() {
+            false => Ok(self.ln_evidence()),
+            true => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
         }
     }
 

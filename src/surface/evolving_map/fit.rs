@@ -117,6 +117,16 @@ pub fn fit(
     known: Known,
     near: Option<&Fitted>,
 ) -> Result<Fitted, NoFit> {
+    unchecked(imager, basis, values, known, near)?.checked()
+}
+
+fn unchecked(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+    near: Option<&Fitted>,
+) -> Result<Fitted, NoFit> {
     let design = Arc::new(Design::new(imager, basis, &values.state()));
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
@@ -157,7 +167,20 @@ pub fn fit(
     let Top { marginal, hessian } = top;
     let ln_evidence = marginal.ln_evidence();
     let at_bounds = reached(&marginal.assumed, &known);
-    Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) }.checked()
+    Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) })
+}
+
+/// The same, wherever the amplitude ends: spots may stand in for what is still to be found of the star.
+///
+/// # Errors
+/// As [`fit`].
+pub(super) fn fit_anyhow(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+) -> Result<Fitted, NoFit> {
+    unchecked(imager, basis, values, known, None)
 }
 
 /// The field of a share of the profiles: nearly that of all of them, at a small part of the work; with its Hessian.

@@ -12,6 +12,7 @@ use crate::sampling::log_density::Status;
 use crate::star::observation::Observations;
 use crate::surface::checks::Checks;
 use crate::surface::imaging::{Data, Imager};
+use crate::surface::mean_profile;
 use crate::surface::maps::{Against, MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots, rms, scatter};
 use crate::surface::nuisances::Estimate;
 use crate::surface::{At, Explained, SpotField};
@@ -193,6 +194,12 @@ impl Modelled {
     fn of(imager: &Imager, basis: &Basis, marginal: &Marginal, coefficients: &DMatrix<f64>) -> Self {
         let response = marginal.design.response();
         let mut depth = response.depths_of_each(&marginal.design.brightness(basis, coefficients));
+        let alike = marginal.design.mean_profile(imager, coefficients);
+        if !alike.is_empty() {
+            let columns = mean_profile::columns(imager);
+            let changes = columns.iter().flat_map(|columns| (columns * &alike).as_slice().to_vec());
+            depth.iter_mut().zip(changes).for_each(|(depth, change)| *depth += change);
+        }
         let slopes: Vec<f64> =
             marginal.slopes(imager, basis, &[]).iter().flat_map(|slopes| slopes.iter().copied()).collect();
         let with_jitter = imager.clone().with_zero_points(marginal.assumed.jitter_kms, &slopes);

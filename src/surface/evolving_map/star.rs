@@ -6,7 +6,8 @@
 //! the same of lines.
 
 use super::climb::{limits as limits_of_field, place as place_of_field};
-use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit, fit};
+use super::fit::fit_anyhow;
+use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
@@ -18,17 +19,31 @@ use std::sync::Arc;
 const DEGREE: usize = 18;
 
 /// A climb ends when a step would gain less than this in ln Z, or after so many.
-const GAIN: f64 = 0.1;
+const GAIN: f64 = 1.0;
 const STEPS: usize = 12;
 
-/// Numbers of the field in a climb: ln amplitude, slope, ln lifetime, ln jitter.
-const OF_FIELD: usize = 4;
+/// Numbers of a climb that are not the star's: ln amplitude, slope, ln lifetime and ln jitter of the field, ln size of
+/// what is wrong alike in all profiles.
+const OF_FIELD: usize = 5;
+const SIZE: usize = 4;
+
+/// Where its size begins, its bounds, and the standard deviation of its prior; at the lower bound there is nothing.
+const MEAN_PROFILE: f64 = 1e-3;
+const MEAN_PROFILES: (f64, f64) = (2e-5, 0.1);
+const MEAN_PROFILE_SD: f64 = 5e-3;
 
 /// Least surface of active regions per filling factor of spots that a climb goes down to.
 const LEAST_AREA: f64 = 0.02;
 
-/// Longest step in a number of the field, and in one of the star in standard deviations of its prior.
-const LONGEST: [f64; 2] = [0.5, 1.0];
+/// Longest step in a coordinate.
+const LONGEST: f64 = 1.0;
+
+/// Least second derivatives of the field.
+const LEAST_BEND: f64 = 10.0;
+
+/// Damping of the first step, and where no step leads up.
+const DAMPING: f64 = 0.05;
+const MOST_DAMPING: f64 = 1e3;
 
 /// Second derivatives of the field that are not told otherwise, as for errors of 10 %.
 const USUAL_BEND: f64 = 100.0;
@@ -55,6 +70,8 @@ pub struct FittedStar {
     pub values: ParameterValues,
     /// Standard deviations of those that were fitted.
     pub sd: Vec<f64>,
+    /// Size of what is wrong alike in all profiles.
+    pub mean_profile: f64,
     /// ln Z, with harmonics up to a low degree.
     pub ln_evidence: f64,
     /// ln of the prior density.
@@ -74,7 +91,7 @@ struct Climb<'a> {
     basis: Basis,
     known: &'a Known,
     priors: &'a [StarPrior],
-    free: [bool; OF_FIELD],
+    free: Vec<bool>,
     limits: Vec<(f64, f64)>,
 }
 
@@ -83,29 +100,37 @@ struct Climb<'a> {
 /// # Errors
 /// [`NoFit`].
 pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
-    fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
+    fit_anyhow(imager, &Basis::coarse(&imager.grid, DEGREE), values, known)
 }
 
-/// Fits numbers of the star, beginning from the field of `near`.
+/// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`.
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPrior]) -> Result<FittedStar, FieldError> {
+pub fn fit_star(
+    imager: &Imager,
+    near: &Fitted,
+    known: &Known,
+    priors: &[StarPrior],
+) -> Result<FittedStar, FieldError> {
     let assumed = near.marginal.assumed;
     let area = |prior: &&StarPrior| prior.parameter == Parameter::RegionArea;
-    let area =
-        priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
+    let area = priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
     let area = area.unwrap_or(1.0);
     let ends = |prior: &StarPrior| match prior.parameter {
         Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
         _ => (f64::NEG_INFINITY, f64::INFINITY),
     };
-    let limits = limits_of_field(known).into_iter().chain(priors.iter().map(ends)).collect();
+    let size = (MEAN_PROFILES.0.ln(), MEAN_PROFILES.1.ln());
+    let limits = limits_of_field(known).into_iter().chain([size]).chain(priors.iter().map(ends)).collect();
     let basis = Basis::coarse(&imager.grid, DEGREE);
-    let climb = Climb { imager, basis, known, priors, free: known.free(&assumed), limits };
+    // who trusts the line trusts the mean profile
+    let line_is_fitted = priors.iter().any(|prior| !Parameter::REGIONS.contains(&prior.parameter));
+    let size_at_first = if line_is_fitted { MEAN_PROFILE } else { 0.0 };
+    let free = known.free(&assumed).into_iter().chain([line_is_fitted]).collect();
+    let climb = Climb { imager, basis, known, priors, free, limits };
     let of_star = priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
-    let place =
-        DVector::from_iterator(OF_FIELD + priors.len(), place_of_field(&assumed).into_iter().copied().chain(of_star));
+    let place = DVector::from_iterator(OF_FIELD + priors.len(), place_of_field(&assumed).into_iter().copied().chain([size_at_first.ln()]).chain(of_star));
     let first = climb.condensed_at(&place, &near.marginal, None)?;
     climb.up(first)
 }
@@ -151,7 +176,13 @@ impl Climb<'_> {
         self.condensed_at(place, near, Some(&near.design))
     }
 
-    fn condensed_at(&self, place: &DVector<f64>, near: &Marginal, like: Option<&Design>) -> Result<Point, FieldError> {
+    fn condensed_at(
+        &self,
+        place: &DVector<f64>,
+        near: &Marginal,
+        like: Option<&Design>,
+    ) -> Result<Point, FieldError> {
+        let imager = &Imager { mean_profile: place[SIZE].exp(), ..self.imager.clone() };
         let mut values = near.values;
         let numbers = self.numbers(place, &values);
         self.priors.iter().zip(&numbers).for_each(|(prior, x)| values.set(prior.parameter, *x));
@@ -161,11 +192,12 @@ impl Climb<'_> {
             true => Arc::clone(&near.design),
             false => {
                 let state = values.state();
-                Arc::new(Design::of(self.imager, &self.basis, (self.imager.response(&state), &state), like))
+                Arc::new(Design::of(imager, &self.basis, (imager.response(&state), &state), like))
             }
         };
-        let marginal = Marginal::new(self.imager, &self.basis, design, values, assumed, Some(near))?;
-        let height = self.known.height(&marginal) + self.ln_prior(&numbers);
+        let marginal = Marginal::new(imager, &self.basis, design, values, assumed, Some(near))?;
+        let of_size = -0.5 * (imager.mean_profile / MEAN_PROFILE_SD).powi(2);
+        let height = self.known.height(&marginal) + self.ln_prior(&numbers) + of_size;
         match height.is_finite() {
             true => Ok(Point { place: place.clone(), marginal, height }),
             false => Err(FieldError::NotPositive),
@@ -214,7 +246,8 @@ impl Climb<'_> {
     /// Minus the second derivatives: those of the linearised model at fixed maps, and of the priors.
     fn bend(&self, at: &Point) -> Result<DMatrix<f64>, FieldError> {
         let parameters: Vec<Parameter> = self.priors.iter().map(|prior| prior.parameter).collect();
-        let expansion = at.marginal.expansion(self.imager, &self.basis, &parameters)?;
+        let imager = &Imager { mean_profile: at.place[SIZE].exp(), ..self.imager.clone() };
+        let expansion = at.marginal.expansion(imager, &self.basis, &parameters)?;
         let profiles = expansion.profiles();
         let of_star = expansion.information.view((profiles, profiles), (parameters.len(), parameters.len()));
         let mut of_star = of_star.into_owned();
@@ -227,9 +260,16 @@ impl Climb<'_> {
         Ok(bend)
     }
 
-    /// The gradient, by central differences over steps that change the height by some half; and minus the second
-    /// derivatives along each number.
-    fn gradient(&self, at: &Point, bend: &DMatrix<f64>) -> (DVector<f64>, DVector<f64>) {
+    /// The same, with those along each number of the field.
+    fn with_field(&self, at: &Point, of_field: &[f64]) -> Result<DMatrix<f64>, FieldError> {
+        let mut bend = self.bend(at)?;
+        of_field.iter().enumerate().for_each(|(i, along)| bend[(i, i)] = *along);
+        Ok(bend)
+    }
+
+    /// The gradient, by differences over steps that change the height by some half: central ones, which give minus the
+    /// second derivatives along each number, too, or one-sided ones where these are known well.
+    fn gradient(&self, at: &Point, bend: &DMatrix<f64>, central: bool) -> (DVector<f64>, DVector<f64>) {
         let along = |i: usize| {
             if !self.is_free(i) {
                 return (0.0, bend[(i, i)]);
@@ -241,7 +281,9 @@ impl Climb<'_> {
                 let moved = place[i] - at.place[i];
                 (moved != 0.0).then(|| self.at(&place, &at.marginal).ok().map(|there| (moved, there.height)))?
             };
-            match (beside(h), beside(-h)) {
+            let above = beside(h);
+            let below = if central || above.is_none() { beside(-h) } else { None };
+            match (above, below) {
                 (Some((up, above)), Some((down, below))) => {
                     let (a, b) = ((above - at.height) / up, (below - at.height) / down);
                     let second = 2.0 * (b - a) / (up - down);
@@ -259,57 +301,68 @@ impl Climb<'_> {
         (of(&|a| a.0), of(&|a| a.1))
     }
 
+    /// The way up, by Newton's steps, damped as those of Levenberg and Marquardt (Nocedal & Wright 2006, section 10.3).
     fn up(&self, mut here: Point) -> Result<FittedStar, FieldError> {
         let count = self.limits.len();
         let mut bend = self.bend(&here)?;
-        let (mut gradient, mut along) = self.gradient(&here, &bend);
+        let (mut gradient, along) = self.gradient(&here, &bend, true);
+        let of_field: Vec<f64> = (0..OF_FIELD).map(|i| along[i].max(LEAST_BEND)).collect();
+        let mut damping = DAMPING;
+        bend = self.with_field(&here, &of_field)?;
+        let mut learnt = false;
         for step in 0..STEPS {
-            // as bent along each number as was seen
-            let scale = DVector::from_fn(count, |i, _| (along[i].max(0.05 * bend[(i, i)]) / bend[(i, i)]).sqrt());
-            bend.component_mul_assign(&(&scale * scale.transpose()));
             let pushes = |i: usize| {
                 let (low, high) = self.limits[i];
-                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
-                    || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
+                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0) || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
             };
             let moves: Vec<bool> = (0..count).map(|i| self.is_free(i) && !pushes(i)).collect();
-            let among = DMatrix::from_fn(count, count, |i, j| match i == j {
-                true => bend[(i, i)].max(1e-6),
-                false if moves[i] && moves[j] => bend[(i, j)],
-                false => 0.0,
-            });
             let inside = DVector::from_fn(count, |i, _| if moves[i] { gradient[i] } else { 0.0 });
-            let factor = among.clone().cholesky().or_else(|| DMatrix::from_diagonal(&among.diagonal()).cholesky());
-            let Some(mut way) = factor.map(|factor| factor.solve(&inside)) else { break };
-            let hoped = 0.5 * inside.dot(&way);
+            let way = |damping: f64| {
+                let damped = DMatrix::from_fn(count, count, |i, j| match i == j {
+                    true => (1.0 + damping) * bend[(i, i)].max(1e-6),
+                    false if moves[i] && moves[j] => bend[(i, j)],
+                    false => 0.0,
+                });
+                damped.cholesky().map(|factor| factor.solve(&inside))
+            };
+            let Some(hoped) = way(damping).map(|way| 0.5 * inside.dot(&way)) else {
+                // what was learnt on the way does not go with the star's part
+                match learnt {
+                    true => (bend, learnt) = (self.with_field(&here, &of_field)?, false),
+                    false => break,
+                }
+                continue;
+            };
             if std::env::var("DIMCMC_TRACE").is_ok() {
-                eprintln!(
-                    "{step} height {:.2} hoped {hoped:.2} place {:.3?} gradient {:.2?}",
-                    here.height,
-                    here.place.as_slice(),
-                    gradient.as_slice()
-                );
+                eprintln!("{step} height {:.2} hoped {hoped:.2} damping {damping:.3} place {:.3?} gradient {:.2?}", here.height, here.place.as_slice(), gradient.as_slice());
             }
             if hoped < GAIN {
                 break;
             }
-            let longest = |i: usize| if i < OF_FIELD { LONGEST[0] } else { LONGEST[1] };
-            let too_far = (0..count).map(|i| way[i].abs() / longest(i)).fold(1.0, f64::max);
-            way /= too_far;
-            let Some(next) = self.shortened(&here, &way) else { break };
-            let moved = &next.place - &here.place;
-            let gained = next.height - here.height;
+            let mut next = None;
+            while next.is_none() && damping < MOST_DAMPING {
+                next = way(damping).and_then(|way| self.stepped(&here, &way));
+                damping *= if next.is_some() { 0.2 } else { 8.0 };
+            }
+            let Some(next) = next else { break };
+            let (gained, moved) = (next.height - here.height, &next.place - &here.place);
+            let moved = moved.map_with_location(|i, _, x| if self.is_free(i) { x } else { 0.0 });
             here = next;
             if gained < 0.3 * GAIN {
                 break;
             }
-            let (there, bends) = self.gradient(&here, &bend);
-            let bent = &gradient - &there;
-            let before = &bend * &moved;
-            if moved.dot(&bent) > 0.05 * moved.dot(&before) {
+            // the star's part anew; what is left is learnt on the way (BFGS; chapter 6 there)
+            let of_star = self.bend(&here)?;
+            let corner = (OF_FIELD, OF_FIELD);
+            let size = (count - OF_FIELD, count - OF_FIELD);
+            bend.view_mut(corner, size).copy_from(&of_star.view(corner, size));
+            let there = self.gradient(&here, &bend, false).0;
+            let (bent, before) = (&gradient - &there, &bend * &moved);
+            if moved.dot(&bent) > 0.1 * moved.dot(&before) {
                 bend += &bent * bent.transpose() / moved.dot(&bent) - &before * before.transpose() / moved.dot(&before);
+                learnt = true;
             }
-            (gradient, along) = (there, bends);
+            gradient = there;
         }
         let covariance = match bend.clone().cholesky() {
             Some(factor) => factor.inverse(),
@@ -317,23 +370,22 @@ impl Climb<'_> {
         };
         let of_star = (OF_FIELD, self.priors.len());
         let jacobian = self.jacobian(&here);
-        let covariance =
-            &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
+        let covariance = &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
         let sd = covariance.diagonal().map(f64::sqrt);
         let numbers = self.numbers(&here.place, &here.marginal.values);
         let ln_prior = self.ln_prior(&numbers);
         let sd = sd.iter().copied().collect();
-        Ok(FittedStar { values: here.marginal.values, sd, ln_evidence: here.marginal.ln_evidence(), ln_prior })
+        let mean_profile = Some(here.place[SIZE].exp()).filter(|size| *size > 1.5 * MEAN_PROFILES.0).unwrap_or(0.0);
+        Ok(FittedStar { values: here.marginal.values, sd, mean_profile, ln_evidence: here.marginal.ln_evidence(), ln_prior })
     }
 
-    /// The first of ever shorter steps that leads up.
-    fn shortened(&self, here: &Point, way: &DVector<f64>) -> Option<Point> {
-        [1.0, 0.3, 0.1, 0.03].iter().find_map(|share| {
-            let place = DVector::from_fn(way.len(), |i, _| {
-                (here.place[i] + share * way[i]).clamp(self.limits[i].0, self.limits[i].1.max(here.place[i]))
-            });
-            let place = DVector::from_fn(way.len(), |i, _| if self.is_free(i) { place[i] } else { here.place[i] });
-            self.condensed_at(&place, &here.marginal, None).ok().filter(|next| next.height > here.height)
-        })
+    /// The point at the end of a step, where it is higher.
+    fn stepped(&self, here: &Point, way: &DVector<f64>) -> Option<Point> {
+        let to = |i: usize| {
+            let (low, high) = self.limits[i];
+            (here.place[i] + way[i].clamp(-LONGEST, LONGEST)).clamp(low, high.max(here.place[i]))
+        };
+        let place = DVector::from_fn(way.len(), |i, _| if self.is_free(i) { to(i) } else { here.place[i] });
+        self.condensed_at(&place, &here.marginal, None).ok().filter(|next| next.height > here.height)
     }
 }

@@ -17,7 +17,7 @@ pub use photometry::{LightCurveSettings, LightSource};
 
 use super::error::{ConfigError, Fault};
 use super::identity::fingerprint;
-use super::written::{Config, Hyperparameter, ImagingSettings, OfField, PlanSection, VelocityJitter};
+use super::written::{Config, Hyperparameter, ImagingSettings, OfField, PlanSection, VelocityDrift, VelocityJitter};
 use crate::field::Lifetime;
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::ensemble::SamplerSettings;
@@ -31,7 +31,7 @@ use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
 use photometry::resolve_photometry;
 use simulation::check_plan;
-use star::{fitted_regions, resolve_star};
+use star::{fitted_star, resolve_star};
 use std::path::{Path, PathBuf};
 
 /// A whole config, resolved.
@@ -61,6 +61,8 @@ pub struct Settings {
     pub sampler: SamplerSettings,
     /// Numbers of the star that are fitted to the profiles.
     pub fitted: Vec<Parameter>,
+    /// A drift of the velocities that is integrated out.
+    pub drift: VelocityDrift,
     /// The landscape.
     pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
@@ -97,9 +99,12 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         ));
     }
     let fitted = match written.imaging.objective.properties().has_field {
-        true => fitted_regions(&written.star.regions.unwrap_or_default()),
+        true => fitted_star(&written.star)?,
         false => Vec::new(),
     };
+    let has_field = written.imaging.objective.properties().has_field;
+    let drift = written.star.velocity_drift.unwrap_or(VelocityDrift::Linear);
+    let drift = if has_field { drift } else { VelocityDrift::None };
     let grid = written.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
     let resolved = serde_json::to_value(&written).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {
@@ -115,6 +120,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         free,
         sampler: written.sampler,
         fitted,
+        drift,
         grid,
         sha256: fingerprint(&resolved),
         resolved,

@@ -60,11 +60,31 @@ fn regions(section: &RegionsSection) -> Result<Regions, Fault> {
 
 /// Which numbers of active regions are fitted: those that are not given. Without regions that are more than spots
 /// their line counts for nothing.
-pub(super) fn fitted_regions(section: &RegionsSection) -> Vec<Parameter> {
+fn fitted_regions(section: &RegionsSection) -> Vec<Parameter> {
     let numbers = numbers(section);
     let none = numbers[3..].iter().all(|number| *number == Some(0.0));
     let fitted = Parameter::REGIONS.into_iter().zip(numbers).filter(|(_, number)| number.is_none());
     if none { Vec::new() } else { fitted.map(|(parameter, _)| parameter).collect() }
+}
+
+/// Numbers beside those of active regions that may be fitted.
+const LINE: [Parameter; 4] =
+    [Parameter::LineSigma, Parameter::EquivalentWidth, Parameter::Vsini, Parameter::LimbDarkening];
+
+/// Which numbers of the star are fitted to the profiles.
+pub(super) fn fitted_star(star: &Star) -> Result<Vec<Parameter>, Fault> {
+    let mut all = Vec::new();
+    for name in &star.fitted {
+        let Some(parameter) = LINE.into_iter().find(|parameter| parameter.name() == name) else {
+            let known = LINE.map(|parameter| format!("{:?}", parameter.name())).join(", ");
+            return Err(Fault::new("star.fitted", format!("{name:?} is none of {known}")));
+        };
+        if all.contains(&parameter) {
+            return Err(Fault::new("star.fitted", format!("{name:?} is there twice")));
+        }
+        all.push(parameter);
+    }
+    Ok(all.into_iter().chain(fitted_regions(&star.regions.unwrap_or_default())).collect())
 }
 
 pub(super) fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault> {

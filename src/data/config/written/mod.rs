@@ -19,8 +19,8 @@ pub use observations::{ObservationsSection, SimulateSection, VelocitySection};
 pub use per_parameter::{PerParameter, Planet};
 pub use photometry::{OutlierTreatment, PhotometrySection, SEGMENT_GAP_D, SimulatedLight};
 pub use star::{
-    Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star, USUAL_LIMB_DARKENING,
-    USUAL_WAVELENGTH_NM,
+    Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM,
+    VelocityDrift,
 };
 
 use crate::data::simulate::Schedule;

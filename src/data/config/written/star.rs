@@ -49,10 +49,31 @@ pub struct Star<Period = f64> {
     pub contrast: Option<f64>,
     /// The line of one surface element.
     pub line: Line,
+    /// Stellar parameters fitted to the profiles before maps and searches, with objective "marginal-likelihood",
+    /// starting from their values here: any of "line_sigma_kms", "equivalent_width_kms", "vsini_kms" and
+    /// "limb_darkening".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted: Vec<String>,
+    /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood".
+    /// "linear" if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_drift: Option<VelocityDrift>,
     /// Active regions: their line and limb contrast. Fitted if not given, with objective "marginal-likelihood";
     /// otherwise a spot is a dimmed photosphere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub regions: Option<RegionsSection>,
+}
+
+/// Velocity drift.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum VelocityDrift {
+    /// No drift.
+    None,
+    /// In proportion to time.
+    Linear,
+    /// With a curvature.
+    Quadratic,
 }
 
 /// Active regions, spots with the plages around them: their line and limb contrast. With `area`, `area_limb` and
