@@ -31,8 +31,8 @@ pub struct PhotometrySection {
     /// Limb darkening in this band; that of the star if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limb_darkening: Option<LimbDarkeningSection>,
-    /// A gap longer than this (d), from 0 to 1000, begins a new segment. Each segment has a level and a slope of its
-    /// own, which are marginalised over. Nights must not be segments.
+    /// A gap longer than this (d), from 0 to 1000, begins a new segment. Each segment has its own level and slope,
+    /// which are marginalised over. Nights must not be segments.
     #[serde(default = "default_gap_d")]
     pub segment_gap_d: f64,
     /// Factor on the standard errors, above 0.
