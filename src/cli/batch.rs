@@ -54,7 +54,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
 }
 
-/// A line a star and parameter; in place of the numbers, why there are none.
+/// One line per star and parameter, or the reason why there is none.
 fn table(rows: &[Row]) -> String {
     let head = ["star", "parameter", "median", "- 68%", "+ 68%", "R-hat", "ESS", "converged"];
     let mut cells = vec![head.map(str::to_owned).to_vec()];

@@ -105,7 +105,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is shown while a landscape grows, and how long it took.
+/// Progress of a grid, and how long it took.
 struct Meter {
     bar: indicatif::ProgressBar,
     began: Instant,

@@ -162,7 +162,7 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
     Ok(LimitSettings { detection: options.detection(scene), frequencies, best })
 }
 
-/// The orbits that are put in.
+/// The injected orbits.
 fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
     let unbounded = || Failure::failed(format!("{}: {Unbounded}", args.config.display()));
     let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;

@@ -10,7 +10,7 @@ use crate::runs::{grid_scan, run};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// The observations of a config, which is told first what it takes for granted.
+/// The observations of a config, after a note on its assumed objective.
 pub fn scene(config: &Config) -> Result<Scene, SceneError> {
     note_objective(std::slice::from_ref(config));
     Scene::new(config)
@@ -57,7 +57,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// That of a command with a folder of its own where none is given.
+    /// The default of a command.
     pub fn to(folder: PathBuf, force: bool) -> Self {
         Output { folder, force }
     }
