@@ -243,7 +243,7 @@ impl PlanetStar {
                 println!("| {name} | {} | {model} | {} |", group.len(), cells.join(" | "));
             }
         }
-        println!("\n| period | stars | false alarm below 1 % | and at the right period |\n|---|---|---|---|");
+        println!("\n| period | stars | FAP below 1 % | and at the right period |\n|---|---|---|---|");
         for (name, group) in &groups {
             let found = |s: &&&PlanetStar| s.false_alarm < 0.01;
             // within a third of the resolution of the time base

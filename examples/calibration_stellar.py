@@ -1,4 +1,4 @@
-"""Stellar parameters of simulated stars that change: best values and errors by integrated maps and by one map.
+"""Stellar parameters of simulated stars that change: best values and errors by evolving maps and by one map.
 
     python3 examples/calibration_stellar.py --simulator SIMULATOR --simulator target/release/dimcmc \\
         --program target/release/dimcmc
@@ -139,10 +139,10 @@ def table(args):
     integrated = [row for row in discs if row["objective"] == OBJECTIVES[0]]
     fast = lambda row: float(row["true_vsini_kms"]) > FAST
     groups = {
-        "integrated maps": integrated,
+        "evolving maps": integrated,
         f"the same, vsini below {FAST:.0f} km/s": [row for row in integrated if not fast(row)],
         f"the same, vsini above {FAST:.0f} km/s": [row for row in integrated if fast(row)],
-        "integrated maps, spots from a Gaussian field": [row for row in ended if row["simulator"].endswith("field")],
+        "evolving maps, spots from a Gaussian field": [row for row in ended if row["simulator"].endswith("field")],
         "spottedness": [row for row in discs if row["objective"] == OBJECTIVES[1]],
     }
     lines = ["| parameter | stars by | stars | within 1 sd (68 %) | within 2 sd (95 %) | rms error / sd | median sd |"]
@@ -170,7 +170,7 @@ def table(args):
     why = lambda row: row["error"].split(": at these")[0].removeprefix("imaging.chi2_target: ")
     failed = [f"- {row['seed']}, {row['objective']}: {why(row)}" for row in rows if row["error"]]
     text = "\n".join([*lines, "", *failed])
-    calibration_table.under_the_head(args.out, "Stellar parameters of stars that change", text)
+    calibration_table.under_the_head(args.out, "Stellar parameters of stars with evolving spots", text)
 
 
 if __name__ == "__main__":
@@ -180,7 +180,7 @@ if __name__ == "__main__":
     parser.add_argument("--objective", action="append", choices=OBJECTIVES, help="both if not given")
     parser.add_argument("--stars", type=int, default=40)
     parser.add_argument("--first", type=int, default=0, help="number of the first star, for a share of the work")
-    parser.add_argument("--steps", type=int, default=0, help="of a chain of integrated maps; none if 0")
+    parser.add_argument("--steps", type=int, default=0, help="of a chain of evolving maps; none if 0")
     parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/stellar.csv"))
     parser.add_argument("--out", type=Path, default=Path("results/calibration-stellar.md"))

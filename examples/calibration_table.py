@@ -15,10 +15,10 @@ FOUND = 0.01
 RIGHT = 0.5
 LEVELS = ((0.68, 0.99446), (0.95, 1.95996))
 METHODS = {
-    "changing": "maps integrated out",
+    "changing": "evolving maps",
     "static": "spottedness (0.1.0)",
-    "moments": "quasi-periodic process",
-    "moments_refit": "the same, fitted with the orbit",
+    "moments": "QP-GP on RVs",
+    "moments_refit": "QP-GP, refitted with the orbit",
 }
 
 
@@ -147,8 +147,8 @@ def groups(rows):
     static = [row for row in rows if row["lifetime_d"] == math.inf]
     changing = [row for row in rows if row["lifetime_d"] != math.inf]
     kinds = dict.fromkeys(row["kind"] for row in rows)
-    named = [(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
-    return [("all", rows), ("stars that do not change", static), ("stars that change", changing), *named]
+    named = [({"for ever": "static"}.get(kind, kind), [row for row in rows if row["kind"] == kind]) for kind in kinds]
+    return [("all", rows), ("static spots", static), ("evolving spots", changing), *named]
 
 
 def table(head, rows):
@@ -269,7 +269,7 @@ def those_that_are_off(rows):
             k, period = 1000 * row["true_k_kms"], row["true_porb_over_prot"]
             what = [row["kind"], f"{row['seed']:.0f}", f"{k:.0f}", f"{period:.3f}", f"{row['false_alarm']:.1e}"]
             lines.append([*what, f"{row['porb_over_prot']:.3f}", f"{pull:.1f}", f"{across:.1f}"])
-    head = "stars; seed; K (m/s); Porb/Prot; false alarm; Porb/Prot found; in phase (sigma); across (sigma)"
+    head = "stars; seed; K (m/s); Porb/Prot; FAP; Porb/Prot found; in phase (sigma); across (sigma)"
     return table(head.split("; "), lines) if lines else "None.\n\n"
 
 

@@ -5,7 +5,7 @@
 
 Stars like V830 Tau, TAP 26 and V889 Her take turns: each lifetime, without and with a planet. All stars of a campaign
 have the same times, drawn once within the nights of the campaign; spots, noise and phase of the orbit are each star's.
-Each is searched by integrated maps, by one map that does not change (spottedness), and by a quasi-periodic Gaussian
+Each is searched by evolving maps, by one map that does not change (spottedness), and by a quasi-periodic Gaussian
 process on first moments. `dimcmc plan` forecasts each campaign before the first star. A line a star goes to
 results/calibration/campaigns.csv, forecasts to campaigns-plan.csv beside it; the script can be stopped at any time and
 goes on where it was. The second command writes results/campaigns.md. Needs numpy, scipy, jax and tinygp; tables, numpy.
@@ -209,7 +209,7 @@ def median(values):
 
 
 def forecasts(rows, planned):
-    """Forecasts beside what was achieved, by integrated maps and by the others."""
+    """Forecasts beside what was achieved, by evolving maps and by the others."""
     lines = []
     for name, lifetime, group in cells(rows):
         line = next((row for row in planned if (row["kind"], f"{row['lifetime_d']} d") == (name, lifetime)), None)
@@ -223,7 +223,7 @@ def forecasts(rows, planned):
         achieved = [median(sigma_there(row, how) for row in group) for how in ("changing", "static", "moments")]
         ends = [f"{1000 * STARS[name]['k']:.0f}", chance, f"{good} of {len(planets)}"]
         lines.append([name, lifetime, forecast[0], *achieved, *forecast[1:], *ends])
-    head = "star; lifetime; sigma_K forecast; integrated maps; one map; process; K 50 %; K 95 %; K of the planet; "
+    head = "star; lifetime; sigma_K forecast; evolving maps; static map; QP-GP; K 50 %; K 95 %; K of the planet; "
     return calibration_table.table((head + "chance forecast; found").split("; "), lines)
 
 
@@ -257,7 +257,7 @@ def seconds(rows):
         times = [[row[f"{how}seconds"] for row in of] for how in ("", "static_", "moments_")]
         times = [median(value for value in each if value != "") for each in times]
         lines.append([name, median(row["profiles"] for row in of), *times])
-    return calibration_table.table("star; profiles; integrated maps; one map; process".split("; "), lines)
+    return calibration_table.table("star; profiles; evolving maps; static map; QP-GP".split("; "), lines)
 
 
 def write(args):

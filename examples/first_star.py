@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A first star
 #
-# A young star with spots, and a planet of 150 m/s around it: simulated, looked at, searched, sampled. All that this
-# needs is `pip install dimcmc`. The same cells are a notebook, `first_star.ipynb`, and a script, `first_star.py`.
+# A young, spotted star with a planet of 150 m/s: simulated, mapped, searched and sampled. It requires only
+# `pip install dimcmc`. The notebook `first_star.ipynb` and the script `first_star.py` have the same cells.
 
 # %%
 import numpy as np
@@ -12,11 +12,10 @@ import dimcmc
 # %% [markdown]
 # ## The star
 #
-# A config says which star it is, which profiles there are and what is free. Its keys are those of the
-# [reference](../docs/reference/config.md); units are in their names. This star turns in 3 days; 24 profiles over four
-# rotations are simulated, with a signal-to-noise ratio of 1000. Spots are longitude, latitude, radius (degrees) and
-# filling factor. They do not change here, so that one map fits and everything takes seconds; for a star of your own
-# leave `objective` out, and spots may come and go.
+# A config describes star, profiles and free parameters, by the keys of the [reference](../docs/reference/config.md).
+# This star rotates in 3 days. We simulate 24 profiles over four rotations, with a signal-to-noise ratio of 1000. Spots
+# are longitude, latitude, radius (degrees) and filling factor. They are static here, so that a static map fits and
+# everything takes seconds. For your own star delete `objective`: spots then evolve.
 
 # %%
 config = dimcmc.Config(
@@ -51,7 +50,7 @@ config.star.vsini_kms
 # %% [markdown]
 # ## Its profiles
 #
-# `simulate` makes them. Observed ones would be files that the config names, or arrays:
+# `simulate` makes them. Observed profiles are files named in the config, or arrays:
 # `dimcmc.Observations(times_d, velocities_kms, intensity, sigma)`.
 
 # %%
@@ -74,7 +73,7 @@ star
 # %% [markdown]
 # ## Is there a planet?
 #
-# The blind search tries every period, the spots marginalised out, and says in one sentence what it found.
+# The blind search covers all periods, marginalised over the spots. The verdict is one sentence.
 
 # %%
 search = dimcmc.periodogram(config, observations=observations)
@@ -83,13 +82,13 @@ search.figure()
 
 # %%
 k, error = search.summary.best.k_kms, search.summary.best.sigma_k_kms
-print(f"K = {1000 * k:.0f} +- {1000 * error:.0f} m/s, {1000 * config.planet.k_kms:.0f} m/s were put in")
+print(f"K = {1000 * k:.0f} +- {1000 * error:.0f} m/s, {1000 * config.planet.k_kms:.0f} m/s were injected")
 
 # %% [markdown]
 # ## The posterior
 #
 # With `out="runs/first_star"` the chain would stay on disk. Ctrl-C (in a notebook, *interrupt*) stops it; the same call
-# with `resume=True` goes on.
+# with `resume=True` continues it.
 
 # %%
 run = dimcmc.sample(config, observations=observations)
@@ -99,7 +98,7 @@ print(run)
 run.figure("corner")
 
 # %% [markdown]
-# The draws are numpy arrays: quantities of your own follow from them. The minimum mass (Jupiter masses) around a star
+# The draws are numpy arrays, for derived quantities. The minimum mass (Jupiter masses) around a star
 # of one solar mass, on a circular orbit:
 
 # %%

@@ -100,7 +100,7 @@ fn case(name: &str, config: Value, periodogram: Option<usize>) -> Case {
 }
 
 fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
-    println!("| model | chi2 target | spottedness | K (km/s) | 95 % | Porb/Prot | best period blind | false alarm |");
+    println!("| model | chi2 target | spottedness | K (km/s) | 95 % | Porb/Prot | best period blind | FAP |");
     println!("|---|---|---|---|---|---|---|---|");
     for model in &MODELS {
         let case = case(model.0, with(base, model), Some(10_000));
@@ -137,7 +137,7 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
 fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     let (mut near, mut covered, mut all) = (0, 0, 0);
     println!(
-        "| K put in | Porb/Prot | phi | K found | 95 % | minus null, along the orbit | in errors | across, in errors |"
+        "| K injected | Porb/Prot | phi | found | 95 % | minus null, along the orbit | in errors | across, in errors |"
     );
     println!("|---|---|---|---|---|---|---|---|");
     for period in PERIODS {
@@ -200,7 +200,7 @@ fn injected(laboratory: &Laboratory, base: &Value, orbit: Orbit, name: &str) -> 
     std::fs::write(&config, base.to_string())?;
     let scene = Scene::load(&config)?;
     let injected = inject(&scene.whole(), &scene.imager.star, &[orbit]);
-    lsd::write_as(&folder, &injected, &scene.data.sets[0].labels, "with an orbit put in")?;
+    lsd::write_as(&folder, &injected, &scene.data.sets[0].labels, "with an injected orbit")?;
     Ok(std::path::absolute(folder.join("observations.txt"))?)
 }
 

@@ -220,7 +220,7 @@ pub fn changing(laboratory: &Laboratory) -> Result<Report, Failure> {
         for (star, result) in stars[of_group.clone()].iter().zip(&results[of_group.clone()]) {
             report.row(row(group, star, result));
         }
-        let lifetime = lifetime_d.map_or("for ever".to_owned(), |days| format!("{days} d"));
+        let lifetime = lifetime_d.map_or("static".to_owned(), |days| format!("{days} d"));
         let planet = if has_planet { "planet" } else { "no planet" };
         report.number(&format!("spots {lifetime}, {planet}"), sum_up(&results[of_group], has_planet));
         report.figure.push(panel(group, &lifetime, has_planet));

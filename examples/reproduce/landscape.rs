@@ -34,7 +34,7 @@ pub fn landscape(laboratory: &Laboratory) -> Result<Report, Failure> {
         nodes,
         periodic: Parameter::from_name(name).is_some_and(Parameter::is_phase),
     };
-    (laboratory.report)("R3: landscape in three dimensions");
+    (laboratory.report)("R3: likelihood grid in three dimensions");
     let whole = Grid { axes: AXES.iter().map(|a| axis(a, along)).collect() };
     let (grid, survey) = case::landscape(&scene, found.clone(), whole, &folder.join("grid"), laboratory.pool)?;
     let mut report = Report::new(["k_kms", "porb_over_prot", "phi", "spottedness", "chi2", "ln_l"]);

@@ -40,7 +40,7 @@ pub const ROWS: &[Row] = &[
     },
     Row {
         name: "R3",
-        title: "spottedness landscape of K = 100 m/s, P = 1.7, phi = 0.5 (Fig. 4)",
+        title: "spottedness grid of K = 100 m/s, P = 1.7, phi = 0.5 (Fig. 4)",
         paper: "1,000 maps in 3-D and 2,500 per 2-D slice; minimum at the injected values",
         run: landscape::landscape,
     },
@@ -116,7 +116,7 @@ pub const ROWS: &[Row] = &[
     },
     Row {
         name: "changing",
-        title: "stars that change: blind searches with one map, and with all changing maps integrated over",
+        title: "evolving spots: blind searches with static and with evolving maps",
         paper: "",
         run: changing::changing,
     },

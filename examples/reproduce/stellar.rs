@@ -79,7 +79,7 @@ pub fn stellar(laboratory: &Laboratory) -> Result<Report, Failure> {
         let (scene, found) =
             case::search(&config(laboratory, &STELLAR[..free], true), &folder.join("config.json"), laboratory.pool)?;
         let (chain, summary) = case::chain(&scene, found, &folder.join("chain"), laboratory.pool)?;
-        (laboratory.report)(&format!("R12, {dimensions} parameters: landscape of the orbit"));
+        (laboratory.report)(&format!("R12, {dimensions} parameters: likelihood grid of the orbit"));
         let (conditional, found) =
             case::search(&config(laboratory, &[], false), &folder.join("config.json"), laboratory.pool)?;
         let grid = Nodes::Around(laboratory.full_or_quick(9, 5)).grid(&found.optimum);

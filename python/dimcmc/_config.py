@@ -19,7 +19,7 @@ __all__ = ["Config", "Section"]
 class Section(Mapping[str, Any]):
     """A section of a `Config`, such as ``config.star``: a live view.
 
-    Keys are attributes and items. Reading gives the program's default where the config says nothing; writing checks
+    Keys are attributes and items. Missing keys read as the program's default; writing checks
     the whole config and leaves it as it was if it makes no sense.
     """
 
@@ -297,7 +297,7 @@ def _checked(value: Mapping[str, Any], path: str | None) -> tuple[dict[str, Any]
 
 
 def _with_profiles(value: dict[str, Any]) -> dict[str, Any]:
-    """The same where nothing is said of profiles, which are arrays then."""
+    """The same for profiles given as arrays, which the config then omits."""
     section = value.get("observations", {})
     if not isinstance(section, dict) or section.get("path") is not None or section.get("simulate") is not None:
         return value

@@ -38,7 +38,7 @@ def simulate(
     out : str or path, optional
         Folder for the profiles and `truth.json`; by default one that goes with the result.
     force : bool
-        Write into the folder even if it is not empty.
+        Write into a non-empty folder.
     threads : int, optional
         Number of threads; all processors by default. Results do not depend on it.
     progress : bool, optional
@@ -79,14 +79,14 @@ def map(
     config : Config, dict, str or path
         The star.
     observations : Observations, optional
-        Profiles in place of those that the config names.
+        Profiles, in place of those named in the config.
     times_d : sequence of float, optional
         Times (d) of evolving maps (``imaging.objective`` "marginal-likelihood"); by default the mean time of each
         night.
     out : str or path, optional
-        Folder for the files; by default one that goes with the result.
+        Folder for the files; by default a temporary one, deleted with the result.
     force : bool
-        Write into the folder even if it is not empty.
+        Write into a non-empty folder.
     threads : int, optional
         Number of threads; all processors by default. Results do not depend on it.
     progress : bool, optional
@@ -99,7 +99,7 @@ def map(
     Raises
     ------
     ValueError
-        A config that makes no sense, or no map that fits; its message says which key, and the likely reason.
+        Invalid config, or no fitting map; the message names the key and the likely cause.
 
     Examples
     --------
@@ -132,32 +132,32 @@ def periodogram(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Periodogram:
-    """Search for a planet at every period, the star's spots marginalised out.
+    """Blind search for a planet over period, marginalised over the star's spots.
 
     Parameters
     ----------
     config : Config, dict, str or path
         The star.
     observations : Observations, optional
-        Profiles in place of those that the config names.
+        Profiles, in place of those named in the config.
     min_period_d, max_period_d : float, optional
         Shortest and longest period (d); by default that of 5 average Nyquist frequencies, and twice the time base.
     oversampling : float, optional
-        Trial frequencies to each inverse time base; 10 by default.
+        Trial frequencies per inverse time base; 10 by default.
     eccentric : bool
         Fit eccentric orbits around the peaks as well.
     planets : {1, 2}
         Number of planets to search for.
     fixed : bool
-        Hold parameters that the config leaves free at its values, instead of integrating them out.
+        Fix free parameters at the config's values, instead of marginalising over them.
     draws : int
         Number of planet-free Monte Carlo realisations for the FAP, from 1000 to 10 million.
     seed : int
-        Seed of these draws.
+        Seed of these realisations.
     out : str or path, optional
-        Folder for the files; by default one that goes with the result.
+        Folder for the files; by default a temporary one, deleted with the result.
     force : bool
-        Write into the folder even if it is not empty.
+        Write into a non-empty folder.
     threads : int, optional
         Number of threads; all processors by default. Results do not depend on it.
     progress : bool, optional
@@ -198,7 +198,7 @@ def plan(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Plan:
-    """Forecast which planets a schedule would show, before any profile is taken.
+    """Forecast the detection limits of an observing schedule.
 
     Parameters
     ----------
@@ -206,21 +206,21 @@ def plan(
         One or several schedules: ``observations.simulate`` of a star not yet observed, or observed profiles with a
         section ``plan``.
     nights : sequence of int
-        Numbers of nights, each a schedule.
+        Numbers of nights, one schedule each.
     min_period_d, max_period_d : float, optional
         Shortest and longest period (d) searched.
     fixed : bool
-        Hold parameters that the config leaves free at its values, instead of integrating them out.
+        Fix free parameters at the config's values, instead of marginalising over them.
     maps : int
-        Spot maps drawn, of which medians are taken; 0 for lines of a star without spots.
+        Number of spot maps drawn, over which medians are taken; 0 for an unspotted star.
     draws : int
         Number of planet-free Monte Carlo realisations for the FAP, from 1000 to 10 million.
     seed : int
-        Seed of both.
+        Seed of maps and realisations.
     out : str or path, optional
-        Folder for the files; by default one that goes with the result.
+        Folder for the files; by default a temporary one, deleted with the result.
     force : bool
-        Write into the folder even if it is not empty.
+        Write into a non-empty folder.
     threads : int, optional
         Number of threads; all processors by default. Results do not depend on it.
     progress : bool, optional
@@ -259,18 +259,18 @@ def optimise(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Optimum:
-    """Find the best parameters and their error bars.
+    """Find the maximum of the posterior, with uncertainties.
 
     Parameters
     ----------
     config : Config, dict, str or path
         The star, with free parameters.
     observations : Observations, optional
-        Profiles in place of those that the config names.
+        Profiles, in place of those named in the config.
     out : str or path, optional
         Folder for `optimum.json`; by default one that goes with the result.
     force : bool
-        Write into the folder even if it is not empty.
+        Write into a non-empty folder.
     threads : int, optional
         Number of threads; all processors by default. Results do not depend on it.
     progress : bool, optional
@@ -309,23 +309,22 @@ def sample(
 
     Independent ensembles run until every parameter has reached the R-hat and effective sample size of the config, or
     its step limit. The chain is that of the command line, byte for byte. Ctrl-C stops it within a second; what was
-    sampled is kept, and the message of the `KeyboardInterrupt` says how to go on.
+    sampled is kept, and the message of the `KeyboardInterrupt` says how to resume.
 
     Parameters
     ----------
     config : Config, dict, str or path
         The star, with free parameters.
     observations : Observations, optional
-        Profiles in place of those that the config names.
+        Profiles, in place of those named in the config.
     out : str or path, optional
-        Folder of the run; by default one that goes with the result.
+        Folder of the run; by default a temporary one, deleted with the result.
     resume : bool
-        Go on with the run in the folder, to the same bytes as one that was not stopped; or begin it where there is
-        none.
+        Resume the run in the folder, bit-identical to an uninterrupted run; start it if there is none.
     extend : int, optional
-        Go on with the run in the folder, and make so many more steps in any case.
+        Resume the run in the folder and make this many more steps in any case.
     start : {"optimum", "prior"}
-        Where walkers start: around the maxima that a search finds, or all over the prior.
+        Where walkers start: around the maxima that a search finds, or drawn from the prior.
     seed : int, optional
         In place of ``sampler.seed``.
     force : bool
@@ -347,9 +346,9 @@ def sample(
     if start not in ("optimum", "prior"):
         raise ValueError(f'start: must be "optimum" or "prior", not {start!r}')
     if (resume or extend is not None) and out is None:
-        raise ValueError("out: say which run to go on with")
+        raise ValueError("out: name the run to resume")
     if resume and extend is not None:
-        raise ValueError("extend: goes on by itself, leave out resume")
+        raise ValueError("extend: resumes the run, omit resume")
     text = Config(config)._as_text(observations is not None)
     goes_on = extend is not None or (resume and (Path(os.fspath(out or "")) / "manifest.json").is_file())
     with _folder(out, force or goes_on, of_run=True) as (folder, scratch), shown("sample", progress) as show:
@@ -400,7 +399,7 @@ def _folder(
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(f"out: {folder} is not a folder")
         if folder.is_dir() and not may_hold and any(folder.iterdir()) and not _core.is_false_start(os.fspath(folder)):
-            hint = "force=True to replace the files in it" + (", or resume=True to go on" if of_run else "")
+            hint = "force=True to replace the files in it" + (", or resume=True to resume" if of_run else "")
             raise FileExistsError(f"out: {folder}: the folder is not empty; give another one, or {hint}")
         yield folder, None
         return

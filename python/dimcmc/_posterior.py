@@ -17,7 +17,7 @@ __all__ = ["LogPosterior"]
 
 
 class LogPosterior:
-    """The log-posterior of the free parameters, spots marginalised out: what `sample` samples, to the bit.
+    """The log-posterior of the free parameters, marginalised over spots; bit-identical to the density of `sample`.
 
     It is searched for its maximum first, as `sample` does. Objects pickle: another process has it again without that
     search, and with the same values. It may be called from several threads.

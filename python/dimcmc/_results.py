@@ -100,7 +100,7 @@ class Scratch:
 
 
 class Result:
-    """A folder of results, kept where it was asked for, or as long as the object lives.
+    """A folder of results: the one given as ``out``, or a temporary one that lives as long as the object.
 
     Attributes
     ----------
@@ -279,16 +279,16 @@ class Simulation(Result):
 
 
 class Maps(Result):
-    """The star reconstructed, from `map`."""
+    """Maps of the star, from `map`."""
 
     @property
     def summary(self) -> Record:
-        """How good the fit is, and what warns of it (`fit.json`)."""
+        """Goodness of fit and warnings (`fit.json`)."""
         return self._json("fit.json")
 
     @property
     def map(self) -> Record:
-        """The pixels and what they hold (`map.json`). Its ``maps`` is a list: one, one per season, or one per time."""
+        """The pixels and their values (`map.json`). Its ``maps`` is a list: one, one per season, or one per time."""
         return self._json("map.json")
 
     @property
@@ -312,12 +312,12 @@ class Periodogram(Result):
 
     @property
     def verdict(self) -> str:
-        """What is said of the best orbit, in one sentence."""
+        """The verdict on the best orbit, in one sentence."""
         return str(self.summary.verdict.sentence)
 
     @property
     def velocities(self) -> dict[str, NDArray[np.float64]]:
-        """Radial velocities (km/s) free of spots: the columns of `rv.csv`."""
+        """Spot-corrected radial velocities (km/s): the columns of `rv.csv`."""
         return self._table("rv.csv")
 
     @property
@@ -332,7 +332,7 @@ class Periodogram(Result):
 
 
 class Plan(Result):
-    """Which planets schedules would show, from `plan`."""
+    """Detection limits of schedules, from `plan`."""
 
     @property
     def summary(self) -> Record:
@@ -341,12 +341,12 @@ class Plan(Result):
 
     @property
     def periods(self) -> dict[str, NDArray[np.float64]]:
-        """Error of K and K detected (km/s) at every period, for each schedule: the columns of `plan.csv`."""
+        """Uncertainty of K and detectable K (km/s) at every period, for each schedule: the columns of `plan.csv`."""
         return self._table("plan.csv")
 
 
 class Optimum(Result):
-    """The best parameters and their error bars, from `optimise`."""
+    """Maximum of the posterior with uncertainties, from `optimise`."""
 
     @property
     def summary(self) -> Record:
@@ -365,7 +365,7 @@ class Optimum(Result):
 
     @property
     def sd(self) -> dict[str, float]:
-        """The standard deviation of each, by the curvature."""
+        """Standard deviation of each, from the curvature."""
         return dict(self.summary.sd)
 
     @property

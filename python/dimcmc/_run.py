@@ -98,7 +98,7 @@ class Run(Result):
 
     @property
     def verdict(self) -> str | None:
-        """What is said of a planet, in one sentence; None where no orbit was asked for."""
+        """The verdict, in one sentence; None without an orbit."""
         verdict = self.summary.get("verdict")
         return None if verdict is None else str(verdict.sentence)
 
@@ -149,7 +149,7 @@ class Run(Result):
     def export(
         self, format: str, *, out: str | os.PathLike[str] | None = None, force: bool = False
     ) -> list[Path]:
-        """Write the chain for other programs.
+        """Export the chain to other programs.
 
         Parameters
         ----------

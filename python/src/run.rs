@@ -59,7 +59,7 @@ pub fn sample(
         if reason.map_err(failed)? == StopReason::Interrupted {
             let step = run.chain.steps().saturating_sub(1);
             return Err(Fault::Interrupted(format!(
-                "interrupted after step {step}; go on with the same call and out={:?}, resume=True",
+                "interrupted after step {step}; resume with the same call and out={:?}, resume=True",
                 out.display().to_string()
             )));
         }

@@ -99,11 +99,11 @@ def test_runs_go_on_and_begin_again(config: dimcmc.Config, run: dimcmc.Run, tmp_
     config.sampler.steps = 1
     again = dimcmc.sample(config, out=folder, force=True, seed=2, start="prior")
     assert not np.array_equal(again.chain[0], first.chain[0])
-    with pytest.raises(ValueError, match="out: say which run"):
+    with pytest.raises(ValueError, match="out: name the run"):
         dimcmc.sample(config, resume=True)
     with pytest.raises(ValueError, match="start"):
         dimcmc.sample(config, start="nowhere")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="nothing was begun"):
+    with pytest.raises(ValueError, match="holds no results yet"):
         dimcmc.Run.open(tmp_path)
 
 

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// Credible intervals and convergence of a run
 ///
-/// Prints a table (with the injected values where they are known) and writes summary.json into the run's folder,
-/// replacing the one of an earlier look at the same chain.
+/// Prints a table (with the injected values where they are known) and writes summary.json into the run's folder. An
+/// earlier summary.json is replaced.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc analyse runs/demo")]
 pub struct Args {

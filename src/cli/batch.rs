@@ -12,16 +12,15 @@ use std::path::PathBuf;
 
 /// Sample the posteriors of many stars
 ///
-/// The list names a config in each line. Each gets a run as by `sample`, in a folder of its own name below --out,
-/// several at once: as many as there are threads, or ranks of a cluster. Stars that are done are left alone, those that
-/// were stopped go on when the same command is given again, and one that fails stops no other. Writes batch.json, and
-/// prints a table.
+/// The list names one config per line. Each star gets a run as by `sample`, in a folder of its name below --out. As
+/// many stars run at once as there are threads, or MPI ranks. Given again, the command skips finished stars and resumes
+/// interrupted ones. A star that fails does not stop the others. Writes batch.json and prints a table.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc batch configs/stars.txt --out runs/stars")]
 pub struct Args {
-    /// List of configs, one a line, from the list's folder; `#` begins a comment
+    /// List of configs, one per line, relative to the list's folder; `#` begins a comment
     list: PathBuf,
-    /// Folder for the runs and the table; one that is there already is gone on with
+    /// Folder for the runs and the table; an existing one is resumed
     #[arg(long = "out", value_name = "DIR")]
     folder: PathBuf,
 }
@@ -46,7 +45,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let count = |is: &dyn Fn(&End) -> bool| ends.iter().filter(|end| is(end)).count();
     let (interrupted, failed) = (count(&|end| *end == End::Interrupted), count(&|end| matches!(end, End::Failed(_))));
     if interrupted > 0 {
-        let message = format!("interrupted with {interrupted} of {} stars to do; the same command goes on", ends.len());
+        let message = format!("interrupted with {interrupted} of {} stars to do; the same command resumes", ends.len());
         return Err(signals.interrupted(message));
     }
     match failed {
@@ -55,7 +54,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
 }
 
-/// A line a star and parameter; in place of the numbers, why there are none.
+/// One line per star and parameter, or the reason why there is none.
 fn table(rows: &[Row]) -> String {
     let head = ["star", "parameter", "median", "- 68%", "+ 68%", "R-hat", "ESS", "converged"];
     let mut cells = vec![head.map(str::to_owned).to_vec()];

@@ -12,15 +12,15 @@ use std::path::PathBuf;
 
 /// Compare a chain with a likelihood grid of the same data
 ///
-/// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68
-/// % interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must
-/// be of the same data, star, image and objective. Writes comparison.json.
+/// Per parameter: median and 68 % interval of the chain; vertex and error bar of the paraboloid; median and 68 %
+/// interval of the likelihood grid under the chain's prior; their differences, and the cost of each. Run and grid must
+/// share data, star, image and objective. Writes comparison.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc compare runs/demo runs/demo_grid --out runs/demo_comparison")]
 pub struct Args {
     /// Folder of the run that `sample` wrote
     run: PathBuf,
-    /// Folder of the landscape that `grid` wrote
+    /// Folder of the likelihood grid that `grid` wrote
     grid: PathBuf,
     #[command(flatten)]
     output: Output,

@@ -22,7 +22,7 @@ pub fn line(text: impl Display) {
     print(format_args!("{text}\n"));
 }
 
-/// Prints what a command is for as it is. That nobody reads on (a closed pipe) is no failure.
+/// Prints results unescaped. A closed pipe is no failure.
 pub fn print_bytes(bytes: &[u8]) {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(bytes).and_then(|()| stdout.flush()) {

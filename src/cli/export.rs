@@ -7,11 +7,11 @@ use std::path::PathBuf;
 
 /// Export a chain, or the RVs of a search, to other programs
 ///
-/// Without --out it goes beside the chain in the run's folder: chain.zarr, chain.h5, chain.csv, or chain_1.txt,
-/// chain.paramnames, ... The warm-up is told apart as `analyse` does it. A run may be exported while it grows.
-/// Of a folder of `periodogram`, --format rv writes the velocities free of spots to the folder rv in it: tables for
-/// radvel, juliet, kima and pyaneti, the full covariance with a likelihood for radvel and tinygp, and how much is lost
-/// without it.
+/// Without --out the export goes into the run's folder: chain.zarr, chain.h5, chain.csv, or chain_1.txt,
+/// chain.paramnames, ... The burn-in is marked or removed as in `analyse`. A running chain can be exported. For a
+/// folder of `periodogram`, --format rv writes the spot-corrected RVs to its subfolder rv: tables for radvel, juliet,
+/// kima and pyaneti, the full covariance, a likelihood for radvel and tinygp, and the loss of precision without the
+/// covariance.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc export runs/demo --format zarr\n  \
                         dimcmc export runs/demo --format getdist --out getdist/demo\n  \
@@ -19,10 +19,10 @@ use std::path::PathBuf;
 pub struct Args {
     /// Folder of the run, or of the search
     run: PathBuf,
-    /// For which program
+    /// Target program
     #[arg(long, value_enum)]
     format: Format,
-    /// File (emcee, csv), folder (zarr, rv) or beginning of the names of files (getdist)
+    /// File (emcee, csv), folder (zarr, rv) or prefix of the file names (getdist)
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
     /// Replace an earlier export
@@ -32,15 +32,15 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Format {
-    /// xarray and ArviZ: a Zarr store, a chain an ensemble
+    /// xarray and ArviZ: a Zarr store, one chain per ensemble
     Zarr,
-    /// emcee's HDF5 backend: all walkers side by side
+    /// HDF5 backend of emcee: all walkers side by side
     Emcee,
-    /// GetDist: a text file an ensemble, names and ranges
+    /// GetDist: one text file per ensemble, names and ranges
     Getdist,
-    /// pandas and others: a row a line of the chain
+    /// pandas and others: one row per line of the chain
     Csv,
-    /// RV packages: the velocities of a search with their covariance
+    /// RV packages: the RVs of a search with their covariance
     Rv,
 }
 

@@ -85,8 +85,8 @@ impl Failure {
             ReferenceError::TargetBelowFloor { .. } => {
                 let config = path.display();
                 Failure::input(format!(
-                    "{config}: imaging.chi2_target: {error}; `dimcmc map {config}` tries out why, and a star whose \
-                     spots change takes imaging.objective \"marginal-likelihood\""
+                    "{config}: imaging.chi2_target: {error}; `dimcmc map {config}` diagnoses why; for evolving \
+                    spots set imaging.objective \"marginal-likelihood\""
                 ))
             }
             ReferenceError::NothingToFit { .. } => {

@@ -1,6 +1,6 @@
 //! `dimcmc grid`: the landscape and its paraboloid.
 
-use super::output::{fitted, Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
@@ -17,12 +17,11 @@ use std::time::{Duration, Instant};
 /// Compute a likelihood grid: a map at every node
 ///
 /// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values.
-/// ln L is the log-probability of `sample` without the prior, relative to the same reference: the best parameters along
-/// the axes, which are searched for first. Around the highest node a paraboloid is fitted to chi2 = -2 ln L: its vertex
-/// is the estimate, and the projection of its surface one above the minimum the error bar. Writes landscape.json (what
-/// it was begun with), landscape.jsonl (a line per node) and paraboloid.json. A landscape that was stopped, by
-/// whatever, goes on with --resume and comes to the same bytes as one that was not; a finished one gets its paraboloid
-/// anew.
+/// ln L is the log-probability of `sample` without the prior, relative to the same reference, the best parameters along
+/// the axes. A paraboloid is fitted to chi2 = -2 ln L around the highest node: its vertex is the estimate, the
+/// half-width of Delta chi2 = 1 along each axis the error bar. Writes landscape.json, landscape.jsonl (one line per
+/// node) and paraboloid.json. Interrupted grids can be resumed with `--resume`; the result is bit-identical to an
+/// uninterrupted one. A finished grid gets a new paraboloid.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc grid configs/demo.json --out runs/demo_grid\n  \
                         dimcmc grid configs/demo.json --out runs/demo_grid --resume")]
@@ -31,14 +30,14 @@ pub struct Args {
     config: PathBuf,
     #[command(flatten)]
     output: Output,
-    /// Go on with the landscape in the folder
+    /// Resume the grid in the folder
     #[arg(long)]
     resume: bool,
-    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or as many as it
-    /// takes
+    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or the fewest it
+    /// needs
     #[arg(long, value_name = "N")]
     fit_nodes: Option<NonZeroUsize>,
-    /// Fit it to nodes no farther than N from the highest one along any axis
+    /// Fit it to nodes at most N steps from the highest one along each axis
     #[arg(long, value_name = "N")]
     fit_radius: Option<NonZeroUsize>,
 }
@@ -60,7 +59,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let pool = cluster::pool(global, &signals);
     let mut scan = if resume {
         signals.defer();
-        let spinner = progress::bar(global, None, "reading the landscape, reference image");
+        let spinner = progress::bar(global, None, "reading the grid, reference image");
         let scan = GridScan::resume(&scene, plan, folder);
         spinner.finish_and_clear();
         scan.map_err(failed)?
@@ -69,7 +68,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
         signals.defer();
         let folder = args.output.create()?;
-        let spinner = progress::bar(global, None, "images that nodes far from the best one start from");
+        let spinner = progress::bar(global, None, "start images for distant nodes");
         let scan = GridScan::begin(&scene, plan, found, folder, args.output.replaces());
         spinner.finish_and_clear();
         scan.map_err(failed)?
@@ -81,7 +80,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     if !whole.map_err(failed)? {
         let (config, folder, nodes) = (args.config.display(), folder.display(), scan.landscape.nodes().len());
         return Err(signals.interrupted(format!(
-            "interrupted after {nodes} nodes; go on with: dimcmc grid {config} --out {folder} --resume"
+            "interrupted after {nodes} nodes; resume with: dimcmc grid {config} --out {folder} --resume"
         )));
     }
     noted?;
@@ -106,7 +105,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is shown while a landscape grows, and how long it took.
+/// Progress of a grid, and how long it took.
 struct Meter {
     bar: indicatif::ProgressBar,
     began: Instant,

@@ -30,7 +30,7 @@ fn list(command: &Command) -> String {
     let about = |name: &str| match command.find_subcommand(name) {
         Some(found) => Some(found.get_about().map(ToString::to_string).unwrap_or_default()),
         // clap's own, which is not there yet
-        None => (name == "help").then(|| "Explain a command".to_owned()),
+        None => (name == "help").then(|| "Show the help of a command".to_owned()),
     };
     let width = command.get_subcommands().map(|c| c.get_name().len()).max().unwrap_or(0);
     let shown = |(title, names): (&str, &[&str])| {

@@ -14,13 +14,13 @@ use std::path::{Path, PathBuf};
 ///
 /// Reads inzdi.dat, model-voigt-line.dat beside it, and the profiles that it lists. Writes the config and the list of
 /// profiles beside it (star.json, star_observations.txt). Epoch, angles, signs and units are the same in both programs.
-/// What has no counterpart is listed; what ZDIpy does not know, the priors among it, is found as by `init`.
+/// Keys without counterpart are listed; values unknown to ZDIpy, such as priors, are set as by `init`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc import inzdi.dat --out star.json")]
 pub struct Args {
     /// ZDIpy's inzdi.dat
     input: PathBuf,
-    /// ZDIpy's model of the local line; model-voigt-line.dat beside the input if it is there
+    /// Local-line model of ZDIpy; by default model-voigt-line.dat beside the input
     #[arg(long, value_name = "FILE")]
     line: Option<PathBuf>,
     #[command(flatten)]
@@ -50,7 +50,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     };
     let place = Place { config, lists: vec![own], light_curves: Vec::new(), schema: args.output.schema() };
     let known = args.known.over(import.known.clone())?;
-    let spinner = progress::bar(global, None, "a first look, and a map to try it out");
+    let spinner = progress::bar(global, None, "first look, test fit");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal.map_err(|error| args.known.failure(error, &args.input))?;

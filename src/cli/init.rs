@@ -14,24 +14,24 @@ use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles
 ///
-/// Takes from the profiles what they say: velocity range, vsini, systemic velocity, noise, and priors of the orbit. The
-/// rest is given by options or assumed; a list says which is which. The rotation period cannot be assumed: without it
-/// the config holds a null in its place, and no other command takes it. Then tries it out on some of the profiles, and
-/// writes nothing where `map` would find no maps.
+/// Measures on the profiles: velocity range, vsini, systemic velocity, noise and priors of the orbit. Other values are
+/// given by options or assumed; a table lists the source of each. The rotation period must be given: without it the
+/// config contains a null, which other commands refuse. A test fit on some of the profiles follows. If it finds no map,
+/// nothing is written.
 ///
-/// Several lists are several data sets of one star, each of its own spectrograph: they go into one config, the velocity
-/// offsets of all but the first fitted.
+/// Several lists are data sets of one star, one per spectrograph. They share one config, and the RV offset of each set
+/// after the first is fitted.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
     demo.json"
 )]
 pub struct Args {
-    /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line. Several are
-    /// data sets of one star
+    /// List of profiles, one per line: file, time (d), and optionally the velocity to subtract (km/s). Several lists
+    /// are data sets of one star
     #[arg(required = true)]
     observations: Vec<PathBuf>,
-    /// Light curve of the same weeks: a table of time, flux and its error; repeat the option for several
+    /// Light curve of the same weeks: a table of time, flux and its uncertainty; repeat the option for several
     #[arg(long, value_name = "FILE")]
     photometry: Vec<PathBuf>,
     /// Wavelength (nm) of each light curve, separated by commas: about 790 for TESS, 640 for Kepler
@@ -56,7 +56,7 @@ pub struct KnownArgs {
     /// Inclination of the rotation axis to the line of sight (degrees)
     #[arg(long, value_name = "DEG")]
     inclination: Option<f64>,
-    /// Projected rotation velocity (km/s), instead of the measured one
+    /// Projected rotation velocity (km/s), in place of the measured one
     #[arg(long, value_name = "KMS")]
     vsini: Option<f64>,
     /// Differential rotation: equator minus pole (rad/d)
@@ -71,23 +71,23 @@ pub struct KnownArgs {
     /// Temperature of the spots (K)
     #[arg(long, value_name = "K")]
     spot: Option<f64>,
-    /// Wavelength of the profiles (nm); of several lists one of each, separated by commas
+    /// Wavelength of the profiles (nm); for several lists one each, separated by commas
     #[arg(long, value_name = "NM", value_delimiter = ',')]
     wavelength: Vec<f64>,
-    /// Standard deviation of the local line (km/s), without the spectrograph
+    /// Standard deviation of the local line (km/s), before instrumental broadening
     #[arg(long, value_name = "KMS")]
     line_sigma: Option<f64>,
-    /// Resolving power of the spectrograph; of several lists one of each, separated by commas
+    /// Resolving power of the spectrograph; for several lists one each, separated by commas
     #[arg(long, value_name = "R", value_delimiter = ',')]
     resolving_power: Vec<f64>,
-    /// Velocities (km/s, after VRAD) to be used: what lies outside is not looked at, bad bins at the ends say
+    /// Velocity range to use (km/s, after VRAD); bins outside it, such as bad ends, are ignored
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
     velocity_range: Option<Vec<f64>>,
-    /// What a reconstruction is judged by: all maps of a star that may change, or the map with the fewest spots
+    /// Likelihood of an orbit: marginalised over evolving-spot maps, or the static map with the fewest spots
     #[arg(long, value_name = "NAME", value_parser = ["marginal-likelihood", "spottedness"])]
     objective: Option<String>,
-    /// What a static map may hold (--objective spottedness): brightnesses above and below that of the photosphere, or
-    /// spots alone
+    /// Brightness model of a static map (--objective spottedness): brighter and darker than the photosphere, or spots
+    /// only
     #[arg(long, value_name = "MODEL", value_parser = ["bright-and-dark", "spots"])]
     brightness: Option<String>,
     /// Pixels of the image
@@ -215,7 +215,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         light_curves: args.light_curves(&known)?,
         schema: args.output.schema(),
     };
-    let spinner = progress::bar(global, None, "a first look, and a map to try it out");
+    let spinner = progress::bar(global, None, "first look, test fit");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal.map_err(|error| args.known.failure(error, &lists[0]))?;
@@ -310,7 +310,7 @@ pub fn next_commands(proposal: &Proposal, path: &Path) {
              {config} --out search    is there a planet at all?\n  dimcmc sample {config} --out run            the \
              posterior\n"
         ),
-        false => format!("next: put right what the notes say in {config}, then\n  dimcmc map {config} --out map\n"),
+        false => format!("next: correct {config} as the notes say, then\n  dimcmc map {config} --out map\n"),
     };
     console::print(next);
 }

@@ -19,13 +19,12 @@ const CONFIG: &str = "config.json";
 
 /// Inject a planetary signal into observed profiles
 ///
-/// Each profile is shifted by the orbit's velocity at its time and resampled on its own velocity axis, in its whole
-/// width; errors travel along, times and VRAD stay. The interpolation is band-limited and leaves white noise nearly
-/// white (half way between two bins, the worst case, 0.93 of its variance, with a correlation of 0.07 between
-/// neighbours); beyond the ends of a profile the continuum goes on flat. Stokes V and N are left out. Writes
-/// observations.txt and the profiles it lists, config.json (the config, for these profiles; its start is not the orbit
-/// put in) and truth.json; of several data sets profiles and truth.json of each go to a folder of its name. An orbit
-/// that the profiles have already adds up with it.
+/// Each profile is shifted by the orbit's velocity at its time and resampled on its own velocity axis; uncertainties
+/// shift along, times and VRAD stay. The interpolation is band-limited and leaves white noise nearly white (worst case,
+/// half way between two bins: 0.93 of its variance, correlation 0.07 between neighbours). Stokes V and N are dropped.
+/// Writes observations.txt and the profiles it lists, config.json (for these profiles; its start values differ from the
+/// injected orbit) and truth.json. Each of several data sets gets a folder of its name. An orbit already present in the
+/// profiles adds to the injected one.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 --out \
@@ -42,7 +41,7 @@ pub struct Args {
     /// Orbital period over the rotation period
     #[arg(long, value_name = "RATIO")]
     porb_over_prot: f64,
-    /// Phase (orbital cycles) at which the velocity is largest, counted from rotation cycle 0
+    /// Phase (orbital cycles) of maximum RV, counted from rotation cycle 0
     #[arg(long, value_name = "CYCLES", allow_negative_numbers = true)]
     phi: f64,
 }
@@ -73,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let folder = folder.join(folder_of(set));
         let failed = |e| Failure::failed(format!("{}: cannot be created: {e}", folder.display()));
         std::fs::create_dir_all(&folder).map_err(failed)?;
-        lsd::write_as(&folder, own, &scene.data.sets[s].labels, "with an orbit put in")?;
+        lsd::write_as(&folder, own, &scene.data.sets[s].labels, "with an injected orbit")?;
         let truth = InjectedTruth {
             injected: orbit,
             before: scene.truth,

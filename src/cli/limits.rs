@@ -1,6 +1,6 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
-use super::output::{fitted, Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::config::Config;
@@ -23,12 +23,11 @@ const LIMIT: &str = "limit";
 
 /// Detection limits from injection-recovery tests in period, K and phase
 ///
-/// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability
-/// below 1 % and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around
-/// the image without a planet; with --full, some orbits near the limit go the whole way: resampled profiles, a new
-/// image, a new search. A candidate that the profiles show already is taken out of them first. Writes limits.csv (how
-/// many phases of each period and K are recovered) and limits.json (K at 50 and 95 %, the comparison); `plot` draws the
-/// map.
+/// Injects circular orbits and searches for each as `periodogram` does. Recovered means FAP < 1 % at the right period.
+/// Injections are linearised: an orbit is a shift of the velocities around the planet-free map. With --full, some
+/// orbits near the limit go through the full pipeline: resampled profiles, a new map, a new search. A candidate already
+/// present in the profiles is subtracted first. Writes limits.csv (recovered phases per period and K) and limits.json
+/// (K at 50 and 95 %, the comparison).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc limits configs/demo.json --periods 12 --full 2 --out runs/demo_limits")]
 pub struct Args {
@@ -36,48 +35,47 @@ pub struct Args {
     config: PathBuf,
     #[command(flatten)]
     output: Output,
-    /// Shortest period put in and searched (d); by default that of `periodogram`
+    /// Shortest period injected and searched (d); by default that of `periodogram`
     #[arg(long, value_name = "DAYS")]
     min_period_d: Option<f64>,
-    /// Longest period put in and searched (d); by default twice the time base
+    /// Longest period injected and searched (d); by default twice the time base
     #[arg(long, value_name = "DAYS")]
     max_period_d: Option<f64>,
-    /// Number of periods put in, evenly in their logarithm
+    /// Number of injected periods, evenly spaced in their logarithm
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u16).range(2..=1000))]
     periods: u16,
-    /// Smallest K (km/s); by default a third of the lowest K that a search would find
+    /// Smallest K (km/s); by default a third of the lowest detectable K
     #[arg(long, value_name = "KMS")]
     min_k_kms: Option<f64>,
-    /// Largest K (km/s); by default four times what is found for certain at most periods
+    /// Largest K (km/s); by default four times the K detected with certainty at most periods
     #[arg(long, value_name = "KMS")]
     max_k_kms: Option<f64>,
-    /// Number of semi-amplitudes, evenly in their logarithm
+    /// Number of semi-amplitudes, evenly spaced in their logarithm
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=1000))]
     amplitudes: u16,
     /// Number of phases
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
     phases: u16,
-    /// Orbits near the limit that go the whole way
+    /// Number of orbits near the limit to pass through the full pipeline
     #[arg(long, value_name = "N", default_value_t = 0)]
     full: u16,
-    /// Take the best orbit of the profiles as they are out of them first, even if it is no candidate
+    /// Subtract the best orbit of the observed profiles first, even if it is no candidate
     #[arg(long, conflicts_with = "with_best")]
     without_best: bool,
-    /// Leave the best orbit of the profiles as they are in them, even if it is a candidate
+    /// Keep the best orbit of the observed profiles, even if it is a candidate
     #[arg(long)]
     with_best: bool,
-    /// What `periodogram` does, too: systemic velocity and stellar parameters that are free in the config are
-    /// integrated out within their priors
+    /// Marginalise over the free systemic velocity and stellar parameters, as `periodogram` does
     #[arg(long, alias = "marginalize", conflicts_with = "fixed", hide = true)]
     marginalise: bool,
-    /// Hold the systemic velocity and stellar parameters that are free in the config at its values
+    /// Fix the free systemic velocity and stellar parameters at the config's values
     #[arg(long)]
     fixed: bool,
-    /// Number of stars without a planet that false alarms are taken from
+    /// Number of planet-free Monte Carlo realisations for the FAP
     #[arg(long, value_name = "N", default_value_t = SearchSettings::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
-    /// Seed of the draws, and of the orbits that go the whole way
+    /// Seed of the realisations, and of the orbits of --full
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -91,7 +89,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     remarks(&scene);
     let scene = fitted(global, scene);
     let settings = settings(args, &scene)?;
-    let spinner = progress::bar(global, None, "reconstructing without a planet");
+    let spinner = progress::bar(global, None, "planet-free map");
     let shortcut =
         Shortcut::new(&scene.imager, for_blind_search(scene.settings.values, &scene.settings.free), &settings);
     spinner.finish_and_clear();
@@ -164,7 +162,7 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
     Ok(LimitSettings { detection: options.detection(scene), frequencies, best })
 }
 
-/// The orbits that are put in.
+/// The injected orbits.
 fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
     let unbounded = || Failure::failed(format!("{}: {Unbounded}", args.config.display()));
     let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;

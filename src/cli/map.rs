@@ -1,6 +1,6 @@
 //! `dimcmc map`: one reconstruction at the config's parameter values.
 
-use super::output::{fitted, Output, scene};
+use super::output::{Output, fitted, scene};
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
 use crate::data::config::Config;
@@ -10,13 +10,12 @@ use std::path::PathBuf;
 
 /// Reconstruct the spots at the config's parameter values
 ///
-/// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed
-/// and model profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how
-/// good the fit is).
+/// With the objective "marginal-likelihood" (the default) spots evolve: their amplitude, power-law index and lifetime
+/// are fitted. map.json holds the most probable map and its standard deviation per night, or at the given times. With
+/// the other objectives the map is static: the one of maximum entropy at `imaging.chi2_target`.
 ///
-/// With `imaging.objective` set to "marginal-likelihood" the star may change: the amplitude, slope and lifetime of its
-/// spots are fitted, and map.json holds the most probable map and its standard deviation at every time asked for, by
-/// default a map a night. With light curves (`photometry`), lightcurve.csv has them and what the maps make of them.
+/// Writes map.json, profiles.csv (observed and model profiles), rv.csv (RVs before and after removal of the spot
+/// signal) and fit.json (goodness of fit); with light curves (`photometry`) lightcurve.csv.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {
@@ -24,8 +23,7 @@ pub struct Args {
     config: PathBuf,
     #[command(flatten)]
     output: Output,
-    /// Times (d) of the maps of a star that may change, as in the list of profiles; by default the mean time of each
-    /// night
+    /// Times (d) of evolving maps, in the time system of the profiles; by default the mean time of each night
     #[arg(long, value_name = "D,D,...", value_delimiter = ',', allow_negative_numbers = true)]
     times: Option<Vec<f64>>,
 }

@@ -8,10 +8,10 @@ use std::path::PathBuf;
 
 /// Merge runs that differ only in their seed
 ///
-/// For chains that an array of jobs has sampled. The runs must be of the same config, data and program and have the
-/// same reference; their seeds must differ. The joined run has the ensembles of all, as many steps as the shortest, and
-/// R-hat between all of them; `analyse`, `compare`, `plot`, `report` and `export` take it as any other. It cannot go
-/// on: extend the runs, and join them again. Writes manifest.json, chain.jsonl and summary.json.
+/// For chains sampled by a job array. The runs must share config, data, program version and reference, and differ in
+/// their seeds. The merged run has all ensembles, the number of steps of the shortest run, and R-hat between all
+/// ensembles. `analyse`, `compare`, `plot`, `report` and `export` accept it like any run. It cannot be extended: extend
+/// the runs, then merge again. Writes manifest.json, chain.jsonl and summary.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc merge runs/demo runs/demo_2 --out runs/merged")]
 pub struct Args {
@@ -27,7 +27,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let same = |run: &&PathBuf| std::fs::canonicalize(run).ok() == std::fs::canonicalize(args.output.folder()).ok();
     if args.output.folder().exists() && args.runs.iter().any(|run| same(&run)) {
-        let problem = "is one of the runs: give a folder of its own";
+        let problem = "is one of the runs: give a new folder";
         return Err(Failure::input(format!("--out {}: {problem}", args.output.folder().display())));
     }
     let merged = merge(&args.runs).map_err(failure)?;

@@ -45,7 +45,7 @@ use std::num::NonZeroUsize;
 /// The version, with the commit that it was built from where that is known.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
 
-/// Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
+/// Planets around spotted stars: Doppler imaging and orbit inference from LSD profiles.
 #[derive(Debug, Parser)]
 #[command(name = "dimcmc", version = VERSION, arg_required_else_help = true)]
 struct Cli {
@@ -58,8 +58,7 @@ struct Cli {
 /// Options of every command.
 #[derive(Debug, clap::Args)]
 pub struct Global {
-    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do
-    /// not depend on it
+    /// Number of threads; all processors if not given, one per MPI rank on a cluster. Results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// No progress bar

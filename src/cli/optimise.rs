@@ -1,6 +1,6 @@
 //! `dimcmc optimise`: the best parameters and their curvature.
 
-use super::output::{fitted, Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
 use super::{Failure, Global, console};
 use crate::data::config::Config;
@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 /// Find the maximum of the posterior, with uncertainties
 ///
-/// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the
-/// error bars are those of its curvature. Writes optimum.json.
+/// Climbs from the config's values and from other orbits within the prior, using the gradient of the log-probability.
+/// Uncertainties follow from the curvature at the maximum. Writes optimum.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc optimise configs/demo.json --out runs/demo_optimum")]
 pub struct Args {

@@ -10,7 +10,7 @@ use crate::runs::{grid_scan, run};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// The observations of a config, which is told first what it takes for granted.
+/// The observations of a config, after a note on its assumed objective.
 pub fn scene(config: &Config) -> Result<Scene, SceneError> {
     note_objective(std::slice::from_ref(config));
     Scene::new(config)
@@ -48,16 +48,16 @@ pub fn remarks(scene: &Scene) {
 /// Options of every command that writes.
 #[derive(Debug, clap::Args)]
 pub struct Output {
-    /// Folder for the results; created if need be, must be empty
+    /// Folder for the results; created if needed, must be empty
     #[arg(long = "out", value_name = "DIR")]
     folder: PathBuf,
-    /// Write into the folder even if it is not empty; files of the same names are replaced
+    /// Write into a non-empty folder; files of the same names are replaced
     #[arg(long)]
     force: bool,
 }
 
 impl Output {
-    /// That of a command with a folder of its own where none is given.
+    /// The default of a command.
     pub fn to(folder: PathBuf, force: bool) -> Self {
         Output { folder, force }
     }
@@ -145,7 +145,7 @@ pub struct ConfigFile {
     /// Config to write
     #[arg(long = "out", value_name = "FILE", default_value = "star.json")]
     path: PathBuf,
-    /// Replace the file if it is there
+    /// Replace an existing file
     #[arg(long)]
     force: bool,
 }

@@ -1,6 +1,6 @@
 //! `dimcmc periodogram`: the blind search for a planet.
 
-use super::output::{fitted, Output, scene};
+use super::output::{Output, fitted, scene};
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;
@@ -11,11 +11,10 @@ use std::path::PathBuf;
 
 /// Blind search for a planet over period, marginalised over the star's spots
 ///
-/// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in
-/// closed form, together with radial velocities that are free of spots. K at the best period is given for a target chi2
-/// 3 % lower and higher, too, and without each night. Systemic velocity and stellar parameters are those of the config,
-/// or integrated out within their priors where it leaves them free. Writes rv.csv and covariance.csv (velocities for
-/// any RV package), periodogram.csv and periodogram.json (best orbit, peaks, false alarms).
+/// Maps the star without a planet, then computes the improvement in ln L of a circular orbit at each trial period, with
+/// spot-corrected RVs. K at the best period is also given for a target chi2 3 % lower and higher, and with each night
+/// left out. Free systemic velocity and stellar parameters are marginalised within their priors. Writes rv.csv and
+/// covariance.csv (for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, FAP).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
 pub struct Args {
@@ -30,7 +29,7 @@ pub struct Args {
     /// Longest period (d); by default twice the time base
     #[arg(long, value_name = "DAYS")]
     max_period_d: Option<f64>,
-    /// Trial frequencies to each inverse time base; 10 by default
+    /// Trial frequencies per inverse time base; 10 by default
     #[arg(long, value_name = "N")]
     oversampling: Option<f64>,
     /// Fit eccentric orbits around the peaks as well
@@ -39,18 +38,17 @@ pub struct Args {
     /// Number of planets to search for
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     planets: u8,
-    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors: the
-    /// default
+    /// Marginalise over the free systemic velocity and stellar parameters within their priors: the default
     #[arg(long, alias = "marginalize", conflicts_with = "fixed")]
     marginalise: bool,
-    /// Hold them at the config's values
+    /// Fix them at the config's values
     #[arg(long)]
     fixed: bool,
     /// Number of planet-free Monte Carlo realisations for the FAP
     #[arg(long, value_name = "N", default_value_t = SearchSettings::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
-    /// Seed of the draws
+    /// Seed of the realisations
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -65,7 +63,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let found = BlindSearch::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));
     let found = found.map_err(|error| {
         let is_of_maps = matches!(error, BlindSearchError::Detection(_));
-        spinner.set_message("looking for the reason");
+        spinner.set_message("diagnosing the misfit");
         let reason = if is_of_maps { maps::reason(&scene) } else { String::new() };
         Failure::blind_search(&args.config, error).with(&reason)
     });

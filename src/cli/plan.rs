@@ -10,42 +10,41 @@ use std::path::PathBuf;
 
 /// Forecast the detection limits of an observing schedule
 ///
-/// Of a star that is not yet observed the config says when and how well it will be: `observations.simulate` with its
-/// schedule (or cycles), velocity bins and S/N, and what its spots are like (`imaging.spot_amplitude`, `spot_slope`,
-/// `spot_lifetime_d`; usual ones where they are not given). Of an observed star the section `plan` says which nights
-/// come next. The spots are integrated out as with objective "marginal-likelihood", in closed form: nothing is
-/// simulated. Several schedules are compared: several configs, or several numbers of nights. Writes plan.json and
-/// plan.csv (period, error of K, K detected with a probability of 50 and 95 %); `plot` draws them.
+/// For an unobserved star the config gives schedule (or cycles), velocity bins and S/N under `observations.simulate`,
+/// and the spots by `imaging.spot_amplitude`, `spot_slope`, `spot_lifetime_d` (default values if not given). For an
+/// observed star the section `plan` gives the next nights. Sensitivities follow in closed form, marginalised over
+/// evolving-spot maps; nothing is simulated. Several configs, or several numbers of nights, are compared. Writes
+/// plan.json and plan.csv (period, uncertainty of K, K detected with a probability of 50 and 95 %).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc plan configs/demo.json --out runs/demo_plan\n  \
                         dimcmc plan configs/plan.json --nights 8,12,16 --out runs/plan")]
 pub struct Args {
-    /// Config files (JSON), one a schedule
+    /// Config files (JSON), one per schedule
     #[arg(required = true)]
     configs: Vec<PathBuf>,
     #[command(flatten)]
     output: Output,
-    /// Numbers of nights (of a season), each a schedule; of cycles that are listed, the first nights
+    /// Numbers of nights per season, one schedule each; of listed cycles, the first nights
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = nights)]
     nights: Vec<usize>,
-    /// Shortest period searched (d); by default as `periodogram` would choose it
+    /// Shortest period searched (d); by default that of `periodogram`
     #[arg(long, value_name = "DAYS")]
     min_period_d: Option<f64>,
     /// Longest period searched (d); by default twice the time base
     #[arg(long, value_name = "DAYS")]
     max_period_d: Option<f64>,
-    /// Hold the systemic velocity and stellar parameters that are free in the config at its values; otherwise they are
-    /// integrated out within their priors
+    /// Fix the free systemic velocity and stellar parameters at the config's values; by default they are marginalised
+    /// within their priors
     #[arg(long)]
     fixed: bool,
-    /// Spot maps drawn, of which medians are taken; 0 for lines of a star without spots
+    /// Number of spot maps drawn, over which medians are taken; 0 for an unspotted star
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(0..=1000))]
     maps: u16,
-    /// Number of stars without a planet that false alarms are taken from
+    /// Number of planet-free Monte Carlo realisations for the FAP
     #[arg(long, value_name = "N", default_value_t = 4_000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
-    /// Seed of both
+    /// Seed of maps and realisations
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }

@@ -9,10 +9,9 @@ use std::path::PathBuf;
 
 /// Plot the results in FOLDER as SVG and PNG
 ///
-/// From saved files alone, nothing is computed anew: the map in flattened polar and Mollweide projection, profiles,
-/// residuals and radial velocities of `map`; periodogram and velocities of `periodogram`; corner plot, traces and
-/// autocorrelation of a run; slices of a landscape, with the contours of a run over them where one is given; the
-/// ellipses of `optimise`; the estimates of `compare`; the injected map of `simulate`.
+/// Uses saved files only: map, profiles, residuals and RVs of `map`; periodogram and RVs of `periodogram`; corner plot,
+/// traces and autocorrelation of a run; slices of a likelihood grid, optionally with the contours of a run; confidence
+/// ellipses of `optimise`; estimates of `compare`; the injected map of `simulate`.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc plot runs/demo\n  dimcmc plot runs/demo_grid --with runs/demo --out figures"
@@ -20,16 +19,16 @@ use std::path::PathBuf;
 pub struct Args {
     /// Folder that another command wrote
     folder: PathBuf,
-    /// Folder for the figures; `figures` in FOLDER if not given. Created if need be, must be empty
+    /// Folder for the figures, `figures` in FOLDER if not given; must be empty
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write into the folder even if it is not empty; files of the same names are replaced
+    /// Write into a non-empty folder; files of the same names are replaced
     #[arg(long)]
     force: bool,
-    /// Over a landscape: the contours of the run in this folder
+    /// Overlay the contours of the run in this folder on a likelihood grid
     #[arg(long = "with", value_name = "RUN")]
     run: Option<PathBuf>,
-    /// Pixels of the PNG files to the inch; figures are 88 to 180 mm wide
+    /// Resolution of the PNG files (pixels per inch); figures are 88 to 180 mm wide
     #[arg(long, value_name = "N", default_value_t = DPI, value_parser = dpi)]
     dpi: f64,
 }
@@ -51,7 +50,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     {
         let (run, folder) = (run.display(), args.folder.display());
         return Err(Failure::input(format!(
-            "--with {run}: {folder} holds no landscape ({HEADER}) to draw the run over"
+            "--with {run}: {folder} holds no likelihood grid ({HEADER}) to overlay the run on"
         )));
     }
     let figures = plot::figures(&args.folder, args.run.as_deref())?;

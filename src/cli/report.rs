@@ -21,7 +21,7 @@ pub struct Args {
     /// The file; if not given `report.html` in FOLDER, or beside the first of several
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the file if it is there
+    /// Replace an existing file
     #[arg(long)]
     force: bool,
 }

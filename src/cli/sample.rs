@@ -1,6 +1,6 @@
 //! `dimcmc sample`: the ensemble chain.
 
-use super::output::{fitted, Output, remarks, scene};
+use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, console, progress};
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 /// Sample the posterior of the free parameters
 ///
-/// Searches for the best parameters, then runs independent ensembles until every parameter has reached the R-hat and
+/// Searches for the best parameters, then runs independent ensembles until every parameter reaches the R-hat and
 /// effective sample size of the config, or the step limit. Writes manifest.json, chain.jsonl and summary.json.
 /// Interrupted runs can be resumed with `--resume`; the result is bit-identical to an uninterrupted run.
 #[derive(Debug, clap::Args)]
@@ -28,25 +28,25 @@ pub struct Args {
     config: PathBuf,
     #[command(flatten)]
     output: Output,
-    /// Go on with the run in the folder
+    /// Resume the run in the folder
     #[arg(long)]
     resume: bool,
-    /// Go on with the run in the folder, and make N more steps in any case
+    /// Resume the run in the folder and make N more steps in any case
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     extend: Option<usize>,
     /// Where the walkers start
     #[arg(long, value_enum, default_value = "optimum", conflicts_with_all = ["resume", "extend"])]
     start: Start,
-    /// In place of the config's sampler.seed: for runs of one config that are merged later
+    /// Seed, in place of sampler.seed: for runs of one config to be merged
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Start {
-    /// Around the maxima that the search finds
+    /// Around the maxima found by the search
     Optimum,
-    /// All over the prior
+    /// Drawn from the prior
     Prior,
 }
 
@@ -112,7 +112,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             let (config, folder) = (args.config.display(), folder.display());
             let seed = args.seed.map(|seed| format!(" --seed {seed}")).unwrap_or_default();
             Err(signals.interrupted(format!(
-                "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder}{seed} --resume"
+                "interrupted after step {step}; resume with: dimcmc sample {config} --out {folder}{seed} --resume"
             )))
         }
         StopReason::Converged | StopReason::StepLimit => {

@@ -5,8 +5,8 @@ use crate::data::config;
 
 /// Print the JSON Schema of the config
 ///
-/// It explains every key. An editor that finds it by the config's "$schema" completes keys and marks mistakes; `init`
-/// names it there if it lies beside the config as dimcmc.schema.json.
+/// It documents every key. Editors use it to complete keys and mark mistakes if the config names it under "$schema";
+/// `init` does so if dimcmc.schema.json lies beside the config.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc schema > dimcmc.schema.json")]
 pub struct Args {}

@@ -9,9 +9,9 @@ use std::path::PathBuf;
 
 /// Simulate observations of a spotted star with a planet
 ///
-/// Reads `observations.simulate` of the config. Writes observations.txt and the profiles it lists, which other commands
-/// read by `observations.path`, and truth.json: what they were made with. Of several data sets each has these in a
-/// folder of its name. Light curves (`photometry.simulate`) are written to NAME.csv, which `photometry.path` reads.
+/// Reads `observations.simulate` of the config. Writes observations.txt, the profiles it lists (read by
+/// `observations.path`) and truth.json, the injected values. Each of several data sets gets a folder of its name. Light
+/// curves (`photometry.simulate`) go to NAME.csv, read by `photometry.path`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc simulate configs/demo.json --out demo_data")]
 pub struct Args {

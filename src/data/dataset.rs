@@ -61,8 +61,8 @@ impl Dataset {
         profiles.iter().try_for_each(|set| set.observations.check()).map_err(|problem| fault(&problem))?;
         match profiles.len() {
             sets if sets == settings.sets.len() => {}
-            1 => return Err(fault("profiles at hand are one data set: give one").into()),
-            _ => return Err(fault("profiles at hand are as many data sets as the config has").into()),
+            1 => return Err(fault("the profiles in memory are one data set: give one").into()),
+            _ => return Err(fault("give as many data sets in memory as the config has").into()),
         }
         if settings.sets.iter().any(|set| matches!(set.source, ObservationSource::Simulate(_))) {
             return Err(fault("profiles are given and simulated: leave out `simulate`").into());
@@ -146,8 +146,8 @@ fn one_day_count(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigE
         None => Ok(()),
         Some((set, time)) => {
             let problem = format!(
-                "its times begin at {time} d, those of {} at {first} d: another zero point? Days of all data sets are \
-                 of one count (MJD is JD - 2400000.5)",
+                "its times begin at {time} d, those of {} at {first} d: use one time system for all data sets (MJD \
+                is JD - 2400000.5)",
                 settings.sets[0].key
             );
             Err(settings.fault(&set.key, &problem))

@@ -118,18 +118,16 @@ impl Diagnosis {
         let (reason, changed) = cure.as_ref().map_or((Reason::Errors, unchanged), |(c, f)| (c.reason(), *f));
         let text = match &cure {
             Some((change, changed)) => format!(
-                "{} is the likely reason: with {} a map comes down to chi2 = {:.3} per datum instead of {:.3}",
+                "likely cause: {}; with {} a map reaches chi2/N = {:.3} in place of {:.3}",
                 change.name(),
                 change.words(&patient),
                 chi2(*changed),
                 chi2(unchanged)
             ),
             None => format!(
-                "the errors are the likely reason, or something that the model does not know: a map comes down to \
-                chi2 = {:.3} per \
-                 datum, and other values of vsini, line, continuum, velocity range and rotation period, one at a \
-                 time, do not help; \
-                 errors {unchanged:.2} times as large would do",
+                "likely cause: the uncertainties, or an effect that is not in the model: a map reaches chi2/N = {:.3}; \
+                 no single change of vsini, line, continuum, velocity range or rotation period helps, only \
+                 uncertainties {unchanged:.2} times as large",
                 chi2(unchanged)
             ),
         };

@@ -54,8 +54,8 @@ impl Ephemeris {
             if error > LARGEST_PHASE_ERROR {
                 let Elements { conjunction, phi, .. } = ephemeris.of;
                 let problem = format!(
-                    "this ephemeris tells the phase at {worst:.2} d to {error:.2} orbits only, and the limit is \
-                     {LARGEST_PHASE_ERROR}: give a conjunction nearer to the data, a better period, or {} with a \
+                    "the phase at {worst:.2} d is uncertain by {error:.2} orbits, above the limit of \
+                    {LARGEST_PHASE_ERROR}: give a conjunction nearer to the data, a better period, or {} with a \
                      periodic prior",
                     phi.name()
                 );

@@ -60,7 +60,7 @@ impl Import {
         }
         let rows: Vec<Vec<String>> = self.left_out.iter().map(|row| row.to_vec()).collect();
         let table = columns(&rows, &[Align::Left; 3]);
-        table.lines().fold("not taken over\n".to_owned(), |text, line| text + "  " + line + "\n")
+        table.lines().fold("not imported\n".to_owned(), |text, line| text + "  " + line + "\n")
     }
 }
 
@@ -92,7 +92,7 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
             },
             by: here(input.entropy.line),
         }),
-        objective: Some(Given { value: ObjectiveKind::Spottedness, by: "one map, as there".to_owned() }),
+        objective: Some(Given { value: ObjectiveKind::Spottedness, by: "static map, as in ZDIpy".to_owned() }),
         chi2_target: chi2_target(input),
         ..Known::default()
     };
@@ -164,7 +164,7 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
     }
     match input.target.value {
         Target::Entropy(entropy) => {
-            row(input.target.line, format!("target entropy {entropy}"), "a map goes to a target chi2 here");
+            row(input.target.line, format!("target entropy {entropy}"), "maps have a target chi2 here");
         }
         Target::Chi2(target) if !input.brightness.value => {
             row(
@@ -195,10 +195,10 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
     }
     if input.brightness.value && input.entropy_scale != 1.0 {
         let what = format!("entropy scaling {}", input.entropy_scale);
-        row(input.brightness.line, what, "chi2 alone decides how far a map goes here");
+        row(input.brightness.line, what, "the fit ends at a target chi2 here");
     }
     let (what, why) = match input.entropy.value {
-        BrightnessEntropy::Image => ("default brightness", "here it is 1: profiles say nothing of the scale"),
+        BrightnessEntropy::Image => ("default brightness", "here it is 1: profiles do not constrain the scale"),
         BrightnessEntropy::FillingFactor => {
             let why = "here the default is a filling factor of spots, imaging.default_spot";
             ("default and limiting brightness", why)
@@ -206,18 +206,14 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
     };
     row(input.entropy.line, what.into(), why);
     if input.brightness.value && input.brightness_start.value {
-        row(
-            input.brightness_start.line,
-            "start from a brightness map".into(),
-            "a map does not depend on where it starts here",
-        );
+        row(input.brightness_start.line, "start from a brightness map".into(), "maps do not depend on the start here");
     }
 }
 
 fn leave_out_of_line(line: &LocalLineFile, measured_strength: bool, rows: &mut Vec<[String; 3]>) {
     let mut row = |what: String, why: &str| rows.push([place(&line.path, line.line), what, why.to_owned()]);
     if measured_strength {
-        row(format!("line depth {}", line.depth), "the strength is measured on the profiles, as there");
+        row(format!("line depth {}", line.depth), "the strength is measured on the profiles, as in ZDIpy");
     }
     row(format!("Lande factor {}", line.lande), "Stokes V is not modelled here");
     if line.gravity_darkening != 0.0 {

@@ -159,7 +159,7 @@ fn words(prior: &Prior) -> String {
     match *prior {
         Prior::Uniform { min, max } => format!("uniform from {min:.4} to {max:.4}"),
         Prior::LogUniform { min, max } => format!("log-uniform from {min:.4} to {max:.4}"),
-        Prior::Normal { mean, sd, .. } => format!("normal, {mean:.4} +- {sd:.4}"),
+        Prior::Normal { mean, sd, .. } => format!("normal, {mean:.4} ± {sd:.4}"),
         Prior::Isotropic { .. } => "isotropic".to_owned(),
         Prior::Disc { .. } | Prior::Periodic => "uniform".to_owned(),
     }

@@ -71,7 +71,7 @@ pub enum Parameter {
     RegionAreaLimb,
     /// How much darker spots, with all that is around them, are at the limb.
     RegionDimmingLimb,
-    /// Standard deviation of the spots' filling factor before the data, where maps are integrated over.
+    /// Prior standard deviation of the spot filling factor, where maps are integrated over.
     SpotAmplitude,
     /// Slope of the spots' spectrum there.
     SpotSlope,
@@ -339,8 +339,8 @@ pub const PARAMETERS: [Spec; 32] = [
         latex: r"T_\mathrm{conj}",
         symbol: "*T*_{conj}",
         about: "Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in \
-                place of `phi`.\nA normal prior is an ephemeris: at the time of the data it must tell the phase to a \
-                tenth of an orbit.",
+                place of `phi`.\nA normal prior is an ephemeris: at the time of the data its phase must be known to \
+                a tenth of an orbit.",
         config_key: "planet.t_conjunction_d",
         about_value: "Time of an inferior conjunction (planet in front; d, on the time scale of the observations), in \
                       place of `phi`.",
@@ -558,8 +558,8 @@ pub const PARAMETERS: [Spec; 32] = [
         unit: "km/s",
         latex: r"W_\mathrm{line}",
         symbol: "*W*_{line}",
-        about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a \
-                nuisance of\neach profile's own by the priors alone.",
+        about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, distinguished from \
+        a nuisance per\nprofile by the priors alone.",
         config_key: "star.line.equivalent_width_kms",
         most: most::VELOCITY_KMS,
         step: Step::Relative(2e-3),
@@ -575,8 +575,8 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "contrast",
         latex: "c",
         symbol: "*c*",
-        about: "Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter \
-                than some\nvalue: the darker they are, the fewer a map needs, so that a flat prior ends at 0.",
+        about: "Brightness of a spot over that of the photosphere, 0 to 1. The data give an upper limit only: \
+        darker spots\ncover less area, so that a flat prior ends at 0.",
         config_key: "star.contrast",
         values: (Bound::Included(0.0), Bound::Excluded(1.0)),
         widest: (0.0, 1.0),
@@ -630,13 +630,10 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "region_area",
         latex: r"F",
         symbol: "*F*",
-        about: "Surface with the line of active regions per unit of the spots' filling factor.",
+        about: "Surface with the line of active regions per unit spot filling factor.",
         config_key: "star.regions.area",
         priors: &[Uniform, Normal],
-        role: Role::Surface(
-            |surface| surface.region_area.as_ref(),
-            |surface, x| surface.region_area = Some(x),
-        ),
+        role: Role::Surface(|surface| surface.region_area.as_ref(), |surface, x| surface.region_area = Some(x)),
         ..region((0.0, 20.0), 0.0)
     },
     Spec {
@@ -644,7 +641,7 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "region_area_limb",
         latex: r"F_1",
         symbol: "*F*_{1}",
-        about: "How much more of that surface there is at the limb: the change from the centre of the disc.",
+        about: "Increase of that surface towards the limb: limb minus disc centre.",
         config_key: "star.regions.area_limb",
         priors: &[Uniform, Normal],
         role: Role::Surface(
@@ -658,7 +655,7 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "region_dimming_limb",
         latex: r"q_1",
         symbol: "*q*_{1}",
-        about: "How much darker active regions are at the limb: the change of one minus their brightness from the centre of the disc.",
+        about: "Limb dimming of active regions: one minus their brightness, limb minus disc centre.",
         config_key: "star.regions.dimming_limb",
         priors: &[Uniform, Normal],
         role: Role::Surface(
@@ -672,7 +669,7 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "spot_amplitude",
         latex: r"\sigma_\mathrm{spot}",
         symbol: "*σ*_{spot}",
-        about: "Standard deviation of the spots' filling factor before the data, with objective \
+        about: "Prior standard deviation of the spot filling factor, with objective \
                 \"marginal-likelihood\".",
         config_key: "imaging.spot_amplitude",
         scale: Scale::Logarithmic,
@@ -684,7 +681,7 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "spot_slope",
         latex: r"\alpha_\mathrm{spot}",
         symbol: "*α*_{spot}",
-        about: "How fast the spots' power falls with the degree of the harmonics, with objective \
+        about: "Power-law index of the angular power spectrum of the spots, with objective \
                 \"marginal-likelihood\".",
         config_key: "imaging.spot_slope",
         role: Role::Field(|field| Some(&field.slope), |field, x| field.slope = x),
@@ -696,7 +693,7 @@ pub const PARAMETERS: [Spec; 32] = [
         unit: "d",
         latex: r"\tau_\mathrm{spot}",
         symbol: "*τ*_{spot}",
-        about: "How long spots live (d), with objective \"marginal-likelihood\".",
+        about: "Spot lifetime (d), with objective \"marginal-likelihood\".",
         config_key: "imaging.spot_lifetime_d",
         scale: Scale::Logarithmic,
         step: Step::Fixed(0.1),

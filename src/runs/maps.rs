@@ -67,14 +67,14 @@ impl<'a> Maps<'a> {
             Err(error) => !matches!(error, NoMaps::Times(_)),
         };
         if suspicious && (map_changes || found.is_err()) {
-            report("looking for the reason");
+            report("diagnosing the misfit");
         }
         // a map that changes tells nothing of the errors
         let told = |diagnosis: &Diagnosis| !map_changes || diagnosis.reason != Reason::Errors;
         let diagnosis = suspicious.then(|| diagnosis(scene)).flatten().filter(told);
         match found {
             Ok(mut maps) => {
-                report("looking at the velocities");
+                report("searching the RVs");
                 let orbit = FreeVelocities::of(scene, &maps);
                 let warning = orbit.as_ref().and_then(|free| free.warning(scene, &maps));
                 maps.warnings.extend(warning);

@@ -29,7 +29,7 @@ pub struct Merged {
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
     /// There is nothing to join.
-    #[error("one run alone is not joined: give two or more folders")]
+    #[error("give two or more runs")]
     One,
     /// A run cannot be read.
     #[error(transparent)]
@@ -47,7 +47,7 @@ pub enum MergeError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// A chain without a step.
-    #[error("{}: no complete step to join", .0.display())]
+    #[error("{}: no complete step to merge", .0.display())]
     Empty(PathBuf),
     /// Two runs are the same chain.
     #[error("{} and {}: both have the seed {seed} (sampler.seed): they are the same \

@@ -77,7 +77,7 @@ const KINDS: [(&str, &str); 10] = [
 fn instead(folder: &Path) -> String {
     match KINDS.iter().find(|(file, _)| folder.join(file).is_file()) {
         Some((file, command)) => format!("this folder is of `dimcmc {command}` ({file} is there)"),
-        None => "nothing was begun in this folder, or it ended before its first result".to_owned(),
+        None => "this folder holds no results yet".to_owned(),
     }
 }
 
@@ -120,7 +120,7 @@ pub enum OriginError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// Config or data are not those that it was begun with.
-    #[error("{}: {what} since this run began; begin another run for it", .folder.display())]
+    #[error("{}: {what} since this run began; start a new run", .folder.display())]
     Changed {
         /// The folder.
         folder: PathBuf,
@@ -200,13 +200,11 @@ impl Origin {
     pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Density, OriginError> {
         let (surface, mut imager) = (scene.surface().model(), scene.imager.clone());
         self.measured.star.iter().for_each(|star| star.put_into(&mut imager));
-        surface.rebuilt(imager, space, &self.reference, &scene.settings.values).map_err(|error| {
-            match error {
-                RebuildError::Differs { what, then, now } => {
-                    OriginError::Irreproducible { folder: folder.into(), what, then, now }
-                }
-                other => OriginError::Reference(other),
+        surface.rebuilt(imager, space, &self.reference, &scene.settings.values).map_err(|error| match error {
+            RebuildError::Differs { what, then, now } => {
+                OriginError::Irreproducible { folder: folder.into(), what, then, now }
             }
+            other => OriginError::Reference(other),
         })
     }
 }

@@ -166,7 +166,7 @@ impl SimulatedSet {
             true => {
                 let least = truth.coverage.iter().copied().fold(f64::INFINITY, f64::min);
                 let most = truth.coverage.iter().copied().fold(0.0, f64::max);
-                format!(" in the mean, from {least:.5} to {most:.5} as spots come and go")
+                format!(" in the mean, from {least:.5} to {most:.5} as spots evolve")
             }
             false => String::new(),
         };

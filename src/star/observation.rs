@@ -41,7 +41,10 @@ impl Observations {
     /// The first thing that is wrong, in words.
     pub fn check(&self) -> Result<(), String> {
         if self.profiles.len() < 2 {
-            return Err(format!("{} profile: spots and a planet are told apart by two at least", self.profiles.len()));
+            return Err(format!(
+                "{} profile: at least two are needed to separate spots from a planet",
+                self.profiles.len()
+            ));
         }
         let step = self.step_kms();
         if !(step > 0.0 && step.is_finite()) {

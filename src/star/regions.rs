@@ -37,8 +37,14 @@ pub(super) struct Mixture {
 
 impl Regions {
     /// Spots that are the photosphere, dimmed.
-    pub const PLAIN: Regions =
-        Regions { line_width: 1.0, equivalent_width: 1.0, shift_kms: 0.0, area: 0.0, area_limb: 0.0, dimming_limb: 0.0 };
+    pub const PLAIN: Regions = Regions {
+        line_width: 1.0,
+        equivalent_width: 1.0,
+        shift_kms: 0.0,
+        area: 0.0,
+        area_limb: 0.0,
+        dimming_limb: 0.0,
+    };
 
     /// Whether spots are the photosphere, dimmed: its line counts for nothing.
     pub fn are_plain(&self) -> bool {

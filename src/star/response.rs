@@ -84,7 +84,7 @@ impl Part {
         state: &StarState,
         seen: &Seen,
     ) -> Self {
-        let (deposit, sampling) = (deposit.expect("deposits of the pixels as they are"), &seen.sampling);
+        let (deposit, sampling) = (deposit.expect("deposits of all pixels"), &seen.sampling);
         let grid = VelocityGrid {
             nodes: deposit.nodes,
             step_kms: deposit.step_kms,

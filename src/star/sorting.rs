@@ -295,7 +295,7 @@ mod tests {
             motion: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 }.into(),
             surface: Default::default(),
         };
-        let viewer = Viewer::new(&state, LimbDarkening::Linear(0.7), 1.0);
+        let viewer = Viewer::new(&state, LimbDarkening::Linear(0.7), false, 1.0);
         let times = [0.0, 0.9, 700.3];
         for (pixels, quadrature) in [(3, Quadrature::Centre), (7, Quadrature::Gauss2x2), (900, Quadrature::Gauss2x2)] {
             let grid = SurfaceGrid::equal_area(pixels, quadrature);

@@ -124,13 +124,13 @@ fn what_the_grid_leaves_out_is_said() {
     // half of the posterior
     other_grid(&desk, "/grid/axes", json!({ "k_kms": [0.15, 0.197, 6], "phi": [-0.05, 0.04, 11] }));
     let (table, found) = compared(&desk, "other");
-    says(&table, &["note: the grid does not hold the posterior: ", "paraboloid: no well-defined minimum: "]);
+    says(&table, &["% of the draws lie outside the grid (", "paraboloid: no well-defined minimum: "]);
     assert!((0.2..0.8).contains(&number(&found["outside"])), "{}", found["outside"]);
     assert_eq!(found["outside"], found["parameters"]["k_kms"]["outside"]);
     assert!(found["parameters"]["k_kms"]["paraboloid"].is_null());
 
     other_grid(&desk, "/grid/axes", json!({ "k_kms": [0.1, 0.3, 5], "phi": [-0.05, 0.04, 11] }));
-    says(&compared(&desk, "other").0, &["note: the grid is coarse for integrals over it", "k_kms 5."]);
+    says(&compared(&desk, "other").0, &["note: the grid is coarse (node spacing", "k_kms 5."]);
 
     // none of it: the run's prior ends before the grid begins
     other_grid(&desk, "/grid/axes", json!({ "k_kms": [1.1, 1.2, 3], "phi": [-0.05, 0.04, 3] }));
@@ -160,30 +160,26 @@ fn what_does_not_belong_together_is_refused() {
         (
             "/observations/simulate/seed",
             json!(8),
-            "the observations are not the same: observations.simulate.seed (7 in the run, 8 in the landscape)",
+            "the observations are not the same: observations.simulate.seed (7 in the run, 8 in the grid)",
         ),
         (
             "/planet/k_kms",
             json!(0.21),
-            "the observations are not the same: injected k_kms 0.2 in the run and 0.21 in the landscape",
+            "the observations are not the same: injected k_kms 0.2 in the run and 0.21 in the grid",
         ),
-        (
-            "/planet/porb_over_prot",
-            json!(1.72),
-            "porb_over_prot is fixed at 1.7 in the run and at 1.72 in the landscape",
-        ),
-        ("/imaging/chi2_target", json!(1.06), "imaging.chi2_target (1.05 in the run, 1.06 in the landscape)"),
+        ("/planet/porb_over_prot", json!(1.72), "porb_over_prot is fixed at 1.7 in the run and at 1.72 in the grid"),
+        ("/imaging/chi2_target", json!(1.06), "imaging.chi2_target (1.05 in the run, 1.06 in the grid)"),
         (
             "/imaging/objective",
             json!("entropy"),
-            "imaging.objective (\"spottedness\" in the run, \"entropy\" in the landscape)",
+            "imaging.objective (\"spottedness\" in the run, \"entropy\" in the grid)",
         ),
-        ("/star/rotation_period_d", json!(3.1), "star.rotation_period_d (3.0 in the run, 3.1 in the landscape)"),
-        ("/star/vsini_kms", json!(20.1), "vsini_kms is fixed at 20 in the run and at 20.1 in the landscape"),
+        ("/star/rotation_period_d", json!(3.1), "star.rotation_period_d (3.0 in the run, 3.1 in the grid)"),
+        ("/star/vsini_kms", json!(20.1), "vsini_kms is fixed at 20 in the run and at 20.1 in the grid"),
         (
             "/grid/axes",
             json!({ "vsys_kms": [-0.05, 0.05, 3] }),
-            "vsys_kms is an axis of the landscape and not sampled in the run",
+            "vsys_kms is an axis of the grid and not sampled in the run",
         ),
     ] {
         other_grid(&desk, pointer, value);
@@ -197,7 +193,7 @@ fn what_does_not_belong_together_is_refused() {
     let season = json!({ "first_d": 0.0, "last_d": 1.0, "profiles": 10, "epoch_d": 0.0 });
     header["measured"]["seasons"] = json!([season, season]);
     desk.write("other/landscape.json", &header.to_string());
-    refused(&["maps of the star: 1 in the run, 2 in the landscape"]);
+    refused(&["maps of the star: 1 in the run, 2 in the grid"]);
     desk.write("other/landscape.json", &as_it_was);
     compared(&desk, "other");
 }
@@ -218,7 +214,7 @@ fn what_is_not_there_or_not_whole_is_refused() {
     let nodes = desk.read("grid/landscape.jsonl");
     let end = nodes.match_indices('\n').nth(39).unwrap().0;
     desk.write("grid/landscape.jsonl", &nodes[..=end]);
-    refused("run", "grid", &["grid: 40 of 49 nodes: finish the landscape first, with --resume"]);
+    refused("run", "grid", &["grid: 40 of 49 nodes: finish the grid first, with --resume"]);
     desk.write("grid/landscape.jsonl", &nodes.replacen("\"ln_evidence\"", "\"evidence\"", 1));
     refused("run", "grid", &["grid/landscape.jsonl, line 1: unknown key `evidence`"]);
     desk.write("grid/landscape.jsonl", &nodes);

@@ -52,7 +52,7 @@ fn two_spectrographs_from_files_to_a_chain() {
     config["observations"][0]["exclude"] = json!([[1.0, 1.2]]);
     desk.write("star.json", &config.to_string());
     let said = desk.succeed(&["map", "star.json", "--out", "map"]);
-    says(&said, &["blue: 1 of 7 left out", "red: 7 profiles, zero point"]);
+    says(&said, &["blue: 1 of 7 left out", "red: 7 profiles, RV offset"]);
     let map = desk.json("map/map.json");
     let sets = map["data_sets"].as_array().unwrap();
     assert_eq!((sets[0]["name"].as_str(), sets[0]["profiles"].as_u64()), (Some("blue"), Some(6)));
@@ -97,7 +97,7 @@ fn what_profiles_have_in_common_is_told_apart() {
     let [[_, sigma_held], [value, sigma]] = [offset(&held), offset(&free)];
     assert!((value - 0.3).abs() < 2.0 * sigma && sigma < 0.2, "{value} +- {sigma}");
     assert!(sigma > 1.2 * sigma_held, "{sigma} {sigma_held}");
-    says(&table, &[&format!("zero point {value:.3} +- {sigma:.3} km/s"), "systemic velocity: "]);
+    says(&table, &[&format!("RV offset {value:.3} ± {sigma:.3} km/s"), "systemic velocity: "]);
     assert_eq!(held.get("systemic_velocity"), None);
     let [vsys, sigma_vsys] = velocity(&free["systemic_velocity"]);
     assert!(vsys.abs() < 3.0 * sigma_vsys && sigma_vsys < 0.3 * PRIOR_SD_KMS, "{vsys} +- {sigma_vsys}");
@@ -171,7 +171,7 @@ fn unchanging() -> Value {
 fn a_star_that_does_not_change_has_a_map_a_season() {
     let desk = Desk::new(unchanging());
     let said = desk.succeed(&["map", CONFIG, "--out", "map"]);
-    says(&said, &["0.000 to 6.660 d: 7 profiles, with a map of their own", "249.600 to 256.260 d: 7 profiles"]);
+    says(&said, &["0.000 to 6.660 d: 7 profiles, own map", "249.600 to 256.260 d: 7 profiles"]);
     let map = desk.json("map/map.json");
     let seasons = map["maps"].as_array().unwrap();
     assert_eq!(seasons.len(), 2);
@@ -210,7 +210,7 @@ fn sets_that_count_other_days_are_refused() {
     };
     desk.write("data/red/observations.txt", &list.lines().map(in_jd).collect::<Vec<_>>().join("\n"));
     let message = desk.refusal(&["map", "star.json", "--out", "map"]);
-    says(&message, &["observations[1]", "another zero point", "MJD is JD - 2400000.5"]);
+    says(&message, &["observations[1]", "one time system", "MJD is JD - 2400000.5"]);
 }
 
 /// A profile of one spectrograph every 63 d between those of the other: a map of each alone would leave nothing over.

@@ -326,7 +326,7 @@ fn velocities_are_passed_on_with_their_covariance() {
     let said = desk.succeed(&["export", "search", "--format", "rv"]);
     says(&said, &["written: search/rv/README.txt", "radvel.csv", "rv_likelihood.py"]);
     let readme = desk.read("search/rv/README.txt");
-    says(&readme, &["as such a package would quote it", "instead of 1", "km/s  pyaneti", "m/s   kima"]);
+    says(&readme, &["as quoted by such a package", "instead of 1", "km/s  pyaneti", "m/s   kima"]);
     let lines = |name: &str| desk.read(&format!("search/rv/{name}")).lines().map(str::to_owned).collect::<Vec<_>>();
     let profiles = desk.read("search/rv.csv").lines().count() - 1;
     let heads = [("radvel.csv", 1), ("juliet.dat", 0), ("kima.txt", 1), ("pyaneti.dat", 1), ("covariance_m2s2.csv", 0)];

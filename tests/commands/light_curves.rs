@@ -198,7 +198,7 @@ fn what_is_no_light_curve_is_refused_by_key_file_or_line() {
     table("time,flux,sigma\n1,2,0\n2,2,0\n", &["tess.csv:2", "sigma: 0 must be above 0"]);
     table("time,flux,sigma\n1,nan,0.1\n", &["tess.csv:2", "flux"]);
     table("time,flux,sigma\nnoon,2,0.1\n", &["tess.csv:2", "noon"]);
-    table("time,flux,sigma\n2457000,2,0.1\n", &["photometry", "from any profile", "zero point", "BTJD"]);
+    table("time,flux,sigma\n2457000,2,0.1\n", &["photometry", "from any profile", "one time system", "BTJD"]);
     table("time,flux,sigma\n1,11.2,0.01\n2,11.3,0.01\n", &["tess.csv", "magnitudes", "mag"]);
     table("SIMPLE  =                    T", &["tess.csv", "a FITS file", "to_csv"]);
     says(&desk.refusal(&["simulate", "star.json", "--out", "x"]), &["observations.simulate"]);

@@ -54,7 +54,7 @@ fn a_landscape_is_that_of_the_chain_with_the_field_held() {
     desk.write("mapped.json", &mapped.to_string());
     desk.succeed(&["grid", "mapped.json", "--out", "mapped"]);
     let said = desk.succeed(&["compare", "run", "mapped", "--out", "both"]);
-    says(&said, &["the chain is by the objective marginal-likelihood, the landscape by spottedness"]);
+    says(&said, &["objectives differ (chain: marginal-likelihood, grid: spottedness)"]);
     desk.succeed(&["optimise", CONFIG, "--out", "best"]);
     let optimum = desk.json("best/optimum.json");
     let (k, sd) = (optimum["parameters"]["k_kms"].as_f64().unwrap(), optimum["sd"]["k_kms"].as_f64().unwrap());
@@ -110,7 +110,7 @@ fn what_has_no_meaning_is_refused() {
         &["imaging.spot_break_degree", "marginal-likelihood"],
     );
     // configs of older programs, which meant one map
-    let cure = "give the objective \"spottedness\"";
+    let cure = "set \"spottedness\"";
     refused(
         &|config| {
             config["imaging"] = json!({ "chi2_target": "auto" });

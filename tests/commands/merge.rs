@@ -63,7 +63,7 @@ fn the_whole_is_its_parts() {
     assert_eq!(desk.json("more/manifest.json")["merged_seeds"], json!([3, 4, 5, 6]));
     // it has no random numbers of its own to go on with
     desk.set("/sampler/ensembles", json!(6));
-    says(&desk.refusal(&["sample", CONFIG, "--out", "all", "--resume"]), &["all: several runs joined"]);
+    says(&desk.refusal(&["sample", CONFIG, "--out", "all", "--resume"]), &["all: a merged run"]);
 }
 
 #[test]

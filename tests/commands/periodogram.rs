@@ -186,7 +186,7 @@ fn a_star_that_changes_is_not_judged_by_one_map() {
     assert!(found["verdict"]["false_alarm_probability"].is_null());
     assert!(number(&found["change"]["ln_evidence_gain"]) > 20.0);
     let table = desk.succeed(&["limits", "config.json", "--out", "b", "--periods", "3", "--phases", "2"]);
-    says(&table, &["these limits do not hold: significant spot evolution"]);
+    says(&table, &["Limits invalid: significant spot evolution"]);
 }
 
 #[test]

@@ -162,10 +162,14 @@ fn lines_are_short() {
     hold(faults);
 }
 
+/// Links, pictures and anchors, of pages and of what they link to.
 #[test]
 fn links_lead_somewhere() {
     let mut faults = Vec::new();
-    for page in pages() {
+    let results = sources(&["results"]).into_iter().filter(|path| path.extension().is_some_and(|e| e == "md"));
+    let others = ["CHANGELOG.md", "CONTRIBUTING.md", "python/README.md"].map(|path| root().join(path));
+    let others: Vec<Page> = others.into_iter().chain(results).map(|path| Page::read(&path)).collect();
+    for page in pages().iter().chain(&others) {
         for (number, target) in page.links().into_iter().filter(|(_, target)| !target.starts_with("http")) {
             let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
             let path = match file {
@@ -197,6 +201,30 @@ fn paths_that_are_named_are_there() {
             for path in line.split('`').skip(1).step_by(2).filter(is_path).filter(|path| !root().join(path).exists()) {
                 faults.push(format!("{}:{}: {path} is not there", file.display(), number + 1));
             }
+        }
+    }
+    hold(faults);
+}
+
+/// A guide shows what it describes, and pictures are small.
+#[test]
+fn guides_have_pictures() {
+    let mut faults = Vec::new();
+    // a few commands or keys, and no shape
+    let plain = ["resume", "zdipy", "orbits", "troubleshooting", "many-stars"];
+    for page in pages().iter().filter(|page| ["docs/howto", "docs/tutorials"].iter().any(|f| page.path.starts_with(f)))
+    {
+        let name = page.path.file_stem().unwrap().to_str().unwrap();
+        if !page.text.contains("](../figures/") && !plain.contains(&name) {
+            faults.push(format!("{}: no picture", page.path.display()));
+        }
+    }
+    let all: String = pages().iter().map(|page| page.text.as_str()).collect();
+    for entry in std::fs::read_dir(root().join("docs/figures")).unwrap() {
+        let path = entry.unwrap().path();
+        let (name, bytes) = (path.file_name().unwrap().to_str().unwrap(), path.metadata().unwrap().len());
+        if bytes > 150_000 || !all.contains(&format!("figures/{name})")) {
+            faults.push(format!("docs/figures/{name}: {bytes} bytes, or on no page"));
         }
     }
     hold(faults);

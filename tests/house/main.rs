@@ -10,3 +10,4 @@ mod examples;
 mod reference;
 mod schema;
 mod small;
+mod words;

@@ -24,7 +24,7 @@ const HEAD: &str = "# Every config key
 
 This page is made from the JSON Schema of the config by a test; `dimcmc schema` prints the same for editors. Keys that
 are not here are refused. Under `parameters` stands what is free, each with its prior; all other parameters keep their
-values under `star` and `planet`. [Your first star](../guide/first-star.md) has a config to begin with.
+values under `star` and `planet`. [Write a config](../howto/first-config.md) has an example.
 ";
 
 /// The page.

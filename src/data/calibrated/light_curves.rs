@@ -104,7 +104,7 @@ fn wild_note(fluxes: &[Flux], wild: &[(usize, f64)], key: &str) -> Option<String
     }
     let points = if wild.len() == 1 { "point" } else { "points" };
     let (count, all) = (wild.len(), all.join("; "));
-    (count > 0).then(|| format!("{count} wild {points} left out, which {key}.outliers \"keep\" brings back: {all}"))
+    (count > 0).then(|| format!("{count} outlying {points} rejected ({key}.outliers \"keep\" keeps them): {all}"))
 }
 
 /// Dips that may be transits.
@@ -154,7 +154,7 @@ pub(super) fn near(
             };
             let problem = format!(
                 "its times, {first:.2} to {last:.2} d, are {nearest:.0} d or more from any profile, and spots do not \
-                 live that long; both must count days from one zero point{cure}"
+                 live that long; use one time system for both{cure}"
             );
             return Err(settings.fault(&curve.key, &problem));
         }

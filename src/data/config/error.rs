@@ -144,7 +144,7 @@ fn in_the_users_words(message: &str) -> String {
         e => e.replace("a tuple of size", "an array of length"),
     };
     match found.as_str() {
-        "null" => format!("null stands for a value still to be given: put {expected} in its place"),
+        "null" => format!("null marks a missing value: give {expected}"),
         _ => format!("expected {expected}, found {found}"),
     }
 }

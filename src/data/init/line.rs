@@ -15,7 +15,7 @@ const POORLY: f64 = 0.25;
 
 /// Where the continuum is, where it is not at 1.
 pub(super) fn note_continuum(level: f64, error: f64, ledger: &mut Ledger) {
-    let remark = format!("the continuum beside the line is there, +- {error:.0e}: profiles are divided by it");
+    let remark = format!("level of the continuum beside the line, ± {error:.0e}: profiles are divided by it");
     ledger.note("observations.continuum_level", level, "", Source::Data, remark);
 }
 
@@ -26,11 +26,11 @@ pub(super) fn sigma_kms(look: &FirstLook, line: LineModel, known: &Known, ledger
         true => (
             Source::Assumed,
             format!(
-                "+- {error:.1}: the flanks hardly tell it from vsini, a usual {} counts too; --line-sigma",
+                "± {error:.1}: hardly distinguished from vsini, default {} as a prior; --line-sigma",
                 line.sigma_kms
             ),
         ),
-        false => (Source::Data, format!("+- {error:.1}, local line, by the flanks of the mean profile; --line-sigma")),
+        false => (Source::Data, format!("± {error:.1}, local line, by the flanks of the mean profile; --line-sigma")),
     };
     ledger.settle(("star.line.sigma_kms", "km/s"), &known.line_sigma_kms, (rounded(sigma, 1), source, remark.as_str()))
 }

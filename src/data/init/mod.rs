@@ -96,7 +96,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
         sets[0].ledger.replace(
             "star.vsini_kms",
             draft.star.vsini_kms,
-            "flanks of the mean profile, in place of the given one: see the note",
+            "flanks of the mean profile, replaces the given one: see the note",
         );
     }
     values::note_orbit(&draft, trial.orbit && trial.is_complete(), &mut sets[0].ledger);

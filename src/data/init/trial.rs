@@ -158,8 +158,8 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
     let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());
     let of = if used < all { format!("{used} of the {all}") } else { format!("the {all}") };
     let spots = field.map_or_else(String::new, |field| {
-        let lifetime = field.spot_lifetime_d.map_or_else(String::new, |days| format!(", lifetime some {days:.0} d"));
-        format!(" (amplitude of the spots {:.2}{lifetime})", field.spot_amplitude)
+        let lifetime = field.spot_lifetime_d.map_or_else(String::new, |days| format!(", lifetime ≈ {days:.0} d"));
+        format!(" (spot amplitude {:.2}{lifetime})", field.spot_amplitude)
     });
     let chi2 = maps.summary.chi2_per_datum;
     trial.end = End::Fits(format!("evolving maps fit {of} profiles with chi2 = {chi2:.2} per datum{spots}"));
@@ -323,10 +323,10 @@ fn search(
 
 /// A static map in words.
 fn spotted(spottedness: f64, draft: &Draft, orbit: bool) -> String {
-    let orbit = if orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
+    let orbit = if orbit { ", but only with an orbit: run `periodogram`" } else { "" };
     let (percent, spots) = (100.0 * spottedness, draft.imaging.brightness() == BrightnessModel::Spots);
     let many = match spots && spottedness > MANY_SPOTS {
-        true => "; that is a lot: are vsini, inclination and line right?",
+        true => "; this is high: check vsini, inclination and line",
         false => "",
     };
     let what = match spots {
@@ -355,12 +355,12 @@ impl Trial {
             )
         });
         let ending = match (&self.end, &self.diagnosis) {
-            (End::Untried, _) => "without a rotation period no command takes the config".into(),
+            (End::Untried, _) => "missing rotation period: other commands refuse the config".into(),
             (End::Fits(maps), None) => format!("test fit: {maps}"),
             (End::Fits(maps), Some(diagnosis)) => {
                 let larger =
                     self.errors.iter().flatten().find_map(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
-                        format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
+                        format!("; without it \"auto\" makes the errors {misfit:.1} times those of the continuum")
                     });
                 format!("test fit: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
             }

@@ -124,7 +124,7 @@ impl Values {
         (self.look.unspotted.vsini_kms, self.look.vsini_error_kms) = (vsini_kms, vsini_error_kms);
         if known.line_sigma_kms.is_none() && sigma_error_kms > 0.0 {
             self.line_sigma_kms = rounded(sigma_kms, 1);
-            let remark = format!("+- {sigma_error_kms:.1}, local line, mean of all data sets; --line-sigma");
+            let remark = format!("± {sigma_error_kms:.1}, local line, mean of all data sets; --line-sigma");
             ledger.replace("star.line.sigma_kms", self.line_sigma_kms, &remark);
         }
     }
@@ -142,10 +142,10 @@ impl Values {
         let rotation_period_d = self.rotation_period(known, ledger);
         let mid_d = rounded(0.5 * (look.span_d.0 + look.span_d.1), 3);
         let epoch = (mid_d, Source::Data, "middle of the observations; --epoch");
-        let inclination = assume(assumed::INCLINATION_DEG, "half of all stars are seen at less; --inclination");
-        let by_fit = format!("+- {:.1}, flanks of the mean profile; --vsini", look.vsini_error_kms);
+        let inclination = assume(assumed::INCLINATION_DEG, "the median of random orientations; --inclination");
+        let by_fit = format!("± {:.1}, flanks of the mean profile; --vsini", look.vsini_error_kms);
         let vsini = (rounded(look.unspotted.vsini_kms, 1), Source::Data, by_fit.as_str());
-        let by_centre = format!("+- {:.2}, centre of the mean profile", look.centre_error_kms);
+        let by_centre = format!("± {:.2}, centre of the mean profile", look.centre_error_kms);
         let vsys = (rounded(look.unspotted.centre_kms, 2), Source::Data, by_centre.as_str());
         let vsys_kms = ledger.settle(("star.vsys_kms", "km/s"), &known.vsys_kms, vsys);
         let (porb_over_prot, porb_over_prot_range) = self.periods(cuts, rotation_period_d, ledger);
@@ -252,15 +252,14 @@ impl Values {
         let mut nuisances = LineAndContinuum::default();
         if let Some(wandering) = continuum.wandering {
             nuisances.continuum_offset = significant(wandering, f64::ceil);
-            let remark =
-                format!("continua of single profiles scatter by {wandering:.1e}, more than their noise explains");
+            let remark = format!("the continuum varies between profiles by {wandering:.1e}, above the noise");
             let level = nuisances.continuum_offset;
             ledger.note("imaging.nuisances.continuum_offset", level, "", Source::Data, remark);
         }
         if let Some(tilting) = continuum.tilting {
             let (from, to) = self.velocity_range_kms;
             nuisances.continuum_slope = significant(0.5 * (to - from) * tilting, f64::ceil);
-            let remark = "continua are tilted by that from the middle to the ends, more than their noise explains";
+            let remark = "continua are tilted by this from the middle to the ends, above the noise";
             ledger.note("imaging.nuisances.continuum_slope", nuisances.continuum_slope, "", Source::Data, remark);
         }
         (nuisances != LineAndContinuum::default()).then_some(nuisances)
@@ -274,7 +273,7 @@ impl Values {
             (Some(measured), _) => format!("measured by every command: {}", measured.line()),
             (None, Some(scatter)) => {
                 format!(
-                    "measured by every command: quoted errors are {:.1e}, the continuum scatters by {scatter:.1e}",
+                    "measured by every command: quoted uncertainty {:.1e}, continuum rms {scatter:.1e}",
                     noise.quoted
                 )
             }
@@ -282,7 +281,7 @@ impl Values {
                 format!("as quoted, {:.1e}: {}", noise.quoted, noise::NO_CONTINUUM)
             }
             (None, None) => {
-                format!("measured by every command: quoted errors are {:.1e}, by a map alone", noise.quoted)
+                format!("measured by every command, by a map alone: quoted uncertainty {:.1e}", noise.quoted)
             }
         };
         let given =
@@ -325,8 +324,8 @@ impl Values {
         let (first, last) = self.look.span_d;
         let bins = whole.len() / whole.profiles.len().max(1);
         format!(
-            "{} profiles of {bins} bins of {:.3} km/s, from {first:.3} to {last:.3} ({:.3} d); S/N {:.0} a bin by \
-            their errors",
+            "{} profiles of {bins} bins of {:.3} km/s, from {first:.3} to {last:.3} ({:.3} d); quoted S/N {:.0} per \
+            bin",
             whole.profiles.len(),
             whole.step_kms(),
             last - first,
@@ -350,7 +349,7 @@ impl Values {
         let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
         let disagrees = self.disagreement(known) > DISAGREEMENT;
         let vsini = known.vsini_kms.as_ref().filter(|_| disagrees).map(|given| {
-            format!("vsini is given as {} km/s, the mean profile looks like {measured:.1} +- {error:.1}", given.value)
+            format!("the given vsini is {} km/s, the mean profile suggests {measured:.1} ± {error:.1}", given.value)
         });
         let days = self.look.span_d.1 - self.look.span_d.0;
         let given = |value: &Option<Given<f64>>| value.as_ref().map(|given| given.value);
@@ -376,7 +375,7 @@ impl Values {
         });
         let few = (profiles < FEWEST_FOR_AN_ORBIT).then(|| {
             format!(
-                "{profiles} profiles make a map, and show no orbit: `periodogram` and `sample` take \
+                "{profiles} profiles suffice for a map, not for an orbit: `periodogram` and `sample` take \
                 {FEWEST_FOR_AN_ORBIT} or more"
             )
         });
@@ -465,7 +464,7 @@ fn k_max(cuts: &[&Observations], ledger: &mut Ledger) -> f64 {
     let photons = PHOTON_ERRORS * moments.iter().map(|(_, sigma)| sigma).sum::<f64>() / count;
     let max = significant((extreme(f64::max) - extreme(f64::min)).max(photons), f64::ceil);
     let rms = (moments.iter().map(|(value, _)| value * value).sum::<f64>() / count).sqrt();
-    let remark = format!("uniform; as far as first moments move from peak to peak (rms {rms:.3})");
+    let remark = format!("uniform; peak-to-peak range of the first moments (rms {rms:.3})");
     ledger.note("parameters.k_kms", format!("0 to {max}"), "km/s", Source::Data, remark);
     max
 }

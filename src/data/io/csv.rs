@@ -43,7 +43,7 @@ impl Columns {
                 let cell = cell.trim();
                 let number: f64 = cell.parse().map_err(|_| wrong(format!("{cell:?} is not a number")))?;
                 if number.is_finite() && number.abs() > LARGEST {
-                    return Err(wrong(format!("{name}: {cell} is beyond sense")));
+                    return Err(wrong(format!("{name}: {cell} is out of range")));
                 }
                 column.push(number);
             }

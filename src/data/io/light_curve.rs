@@ -138,7 +138,7 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
     let values = sorted(1);
     let median = values[values.len() / 2];
     if columns.brightness == Brightness::Magnitude {
-        remarks.push(format!("magnitudes, made fluxes in units of that at {median:.3} mag"));
+        remarks.push(format!("magnitudes, converted to fluxes in units of that at {median:.3} mag"));
         rows.iter_mut().for_each(|row| *row = flux_of(*row, median));
     } else if !columns.has_unit {
         let span = values[values.len() * 19 / 20] - values[values.len() / 20];
@@ -210,8 +210,8 @@ fn one_band<'a>(columns: &Columns, cells: impl Iterator<Item = &'a str>) -> Resu
             let name = columns.band.map(|band| columns.name(band)).unwrap_or_default();
             let named = bands.into_iter().collect::<Vec<_>>().join(", ");
             let problem = format!(
-                "column {name} has several: {named}. A light curve is of one band: give each a table of its own, \
-                 listed in photometry"
+                "column {name} has several: {named}. A light curve is of one band: give one table per band, listed \
+                in photometry"
             );
             Err((0, problem))
         }

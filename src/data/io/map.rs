@@ -59,7 +59,7 @@ pub const FILES: [&str; 4] = [MAP, "profiles.csv", "rv.csv", FIT];
 /// Where longitudes count from, for those who read the file without the manual.
 const CONVENTIONS: &str = "psi = longitude + Omega(latitude) (t - epoch_d) is the angle from the central meridian, \
      growing towards the receding limb; Omega(latitude) = omega_eq_rad_d - domega_rad_d sin^2(latitude). Pixels of \
-     equal area stand in rings from south to north; ring_pixels are their numbers, and sin(latitude) of a ring's \
+     equal area lie in rings from south to north; ring_pixels are their numbers, and sin(latitude) of a ring's \
      borders grows by 2 ring_pixels / pixels from -1. In a ring of n pixels, pixel j reaches from longitude 360 j / n \
      to 360 (j + 1) / n degrees.";
 

@@ -94,11 +94,11 @@ impl MeasuredSet {
     pub fn line(&self) -> String {
         let zero_point = self.zero_point.as_ref().map(|of_set| match of_set.found {
             Some(ConstantVelocity { value_kms, sigma_kms }) => {
-                format!(", zero point {value_kms:.3} +- {sigma_kms:.3} km/s, integrated out")
+                format!(", RV offset {value_kms:.3} ± {sigma_kms:.3} km/s (marginalised)")
             }
-            None => ", zero point integrated out".to_owned(),
+            None => ", RV offset marginalised".to_owned(),
         });
-        let errors = self.errors.as_ref().map(|errors| format!(", errors {}", errors.line()));
+        let errors = self.errors.as_ref().map(|errors| format!(", uncertainties {}", errors.line()));
         let (name, profiles) = (&self.name, self.profiles);
         format!("{name}: {profiles} profiles{}{}", zero_point.unwrap_or_default(), errors.unwrap_or_default())
     }
@@ -121,7 +121,7 @@ impl Measured {
     pub fn misfit_text(&self) -> Option<String> {
         let of_set = |set: &MeasuredSet| Some(format!("{}: {}", set.name, set.errors.as_ref()?.misfit_text()?));
         match &self.errors {
-            Some(errors) => Some(format!("{}; `dimcmc map` tries out why", errors.misfit_text()?)),
+            Some(errors) => Some(format!("{}; `dimcmc map` diagnoses why", errors.misfit_text()?)),
             None => self.sets.iter().find_map(of_set),
         }
     }
@@ -136,7 +136,7 @@ impl Measured {
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
             let Season { first_d, last_d, profiles, .. } = season;
-            ("season", format!("{first_d:.3} to {last_d:.3} d: {profiles} profiles, with a map of their own"))
+            ("season", format!("{first_d:.3} to {last_d:.3} d: {profiles} profiles, own map"))
         };
         let seasons = self.seasons.iter().map(season);
         let light =

@@ -13,10 +13,10 @@ const STREAM: u64 = 4;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RandomSpots {
-    /// Spots on the star at a time, on average, 1 to 10,000; of spots for ever exactly.
+    /// Mean number of spots on the star at a time, 1 to 10,000; exact for static spots.
     pub number: usize,
     /// Lifetime (d), above 0: full width at half maximum of the area of a spot, which grows linearly and falls again
-    /// over twice as long. Spots emerge evenly in time. Null for spots that are there for ever.
+    /// over twice as long. Spots emerge evenly in time. Null for static spots.
     pub lifetime_d: Option<f64>,
     /// Smallest and largest radius (degrees), at the time of the largest area.
     pub radius_deg: [f64; 2],

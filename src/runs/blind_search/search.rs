@@ -134,11 +134,11 @@ impl<'a> BlindSearch<'a> {
 
 fn message(stage: Stage) -> String {
     match stage {
-        Stage::PlanetFree => "reconstructing without a planet".to_owned(),
-        Stage::Change => "looking whether the star changes".to_owned(),
-        Stage::Rotation => "looking at other rotation periods".to_owned(),
+        Stage::PlanetFree => "planet-free map".to_owned(),
+        Stage::Change => "testing for spot evolution".to_owned(),
+        Stage::Rotation => "testing other rotation periods".to_owned(),
         Stage::Search => "searching, FAP simulations".to_owned(),
-        Stage::BestOrbit(round) => format!("reconstructing at the best orbit, round {round}"),
+        Stage::BestOrbit(round) => format!("map at the best orbit, round {round}"),
         Stage::SecondPlanet => "searching for a second planet".to_owned(),
     }
 }

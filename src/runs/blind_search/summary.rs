@@ -50,8 +50,8 @@ impl SearchSummary {
         (!is_same_frequency(1.0 / porb_over_prot, frequency, rotation.time_base_cycles)).then(|| {
             let found = rotation_period_d * porb_over_prot;
             Remark::against(
-                format!("the orbit found here is another one ({found:.4} d)"),
-                format!("the blind search judges an orbit of {judged:.4} d, and the one found here has {found:.4} d"),
+                format!("this fit has another period ({found:.4} d)"),
+                format!("the blind search finds P = {judged:.4} d, this fit P = {found:.4} d"),
             )
         })
     }

@@ -26,8 +26,8 @@ impl PeriodogramFile {
         if let Some(ConstantVelocity { value_kms, sigma_kms }) = self.systemic_velocity {
             let digits = decimals(sigma_kms);
             text += &format!(
-                "systemic velocity: {value_kms:.digits$} +- {sigma_kms:.digits$} km/s, from which rv_kms counts; \
-                rv_sigma_kms does not include its error\n"
+                "systemic velocity: {value_kms:.digits$} ± {sigma_kms:.digits$} km/s, subtracted from rv_kms (its \
+                uncertainty is not in rv_sigma_kms)\n"
             );
         }
         if let Some(drift) = &self.drift {
@@ -124,9 +124,9 @@ fn meanings(found: &QuantitiesRecord) -> String {
 }
 
 fn eccentric(orbit: &KeplerianRecord) -> String {
-    let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" +- {x:.digits$}"));
+    let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" ± {x:.digits$}"));
     let mut text = format!(
-        "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circle\n",
+        "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circular orbit\n",
         orbit.eccentricity,
         error(orbit.sigma_eccentricity, 3),
         orbit.omega_deg,
@@ -135,7 +135,7 @@ fn eccentric(orbit: &KeplerianRecord) -> String {
     );
     for quantity in OrbitQuantity::ALL {
         if let Some((value, Some(sigma))) = orbit.quantities.of(quantity) {
-            text += &format!("  its {}: {value:.1$} +- {sigma:.1$}\n", quantity.name(), decimals(sigma));
+            text += &format!("  its {}: {value:.1$} ± {sigma:.1$}\n", quantity.name(), decimals(sigma));
         }
     }
     text
@@ -152,7 +152,10 @@ fn robustness(found: &RobustnessRecord) -> String {
         let short = if at.reached { "" } else { " (not reached)" };
         row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
     }));
-    let without = |night: &NightRecord| format!("without night {:.2}, {} profiles", night.first_time_d, night.profiles);
+    let without = |night: &NightRecord| {
+        let plural = if night.profiles == 1 { "" } else { "s" };
+        format!("without night {:.2}, {} profile{plural}", night.first_time_d, night.profiles)
+    };
     rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
     aligned(&rows)
 }

@@ -147,14 +147,11 @@ impl Comparison {
         comparison.notes = notes::notes(&comparison, &summary);
         let imaging = &pair.settings.imaging;
         if imaging.objective.properties().has_target && imaging.unresolved_spots == UnresolvedSpots::Fitted {
-            comparison.notes.push("the chain counts unresolved spots as noise, the landscape does not".into());
+            comparison.notes.push("the chain includes unresolved-spot noise, the likelihood grid does not".into());
         }
         if imaging.objective != pair.grid_objective {
             let (chain, landscape) = (imaging.objective.name(), pair.grid_objective.name());
-            comparison.notes.push(format!(
-                "the chain is by the objective {chain}, the landscape by {landscape}: differences are those of the \
-                methods"
-            ));
+            comparison.notes.push(format!("objectives differ (chain: {chain}, grid: {landscape}): so do the results"));
         }
         Ok(comparison)
     }

@@ -22,35 +22,32 @@ pub(super) fn notes(comparison: &Comparison, summary: &Summary) -> Vec<String> {
     if !comparison.fixed_in_landscape.is_empty() {
         let missing = comparison.fixed_in_landscape.join(", ");
         notes.push(format!(
-            "{missing} fixed in the landscape and sampled in the chain: a conditional against a marginal posterior, \
-            whose \
-             intervals are wider and may lie elsewhere"
+            "{missing} fixed in the grid, sampled in the chain: its conditional intervals are narrower and may be \
+            shifted"
         ));
     }
     if comparison.outside > OUTSIDE {
         let percent = |name: &str, share: f64| format!("{name} {:.1} %", 100.0 * share);
         let axes = named(&|one| Some(one.outside).filter(|share| *share > 0.0), &percent).join(", ");
         notes.push(format!(
-            "the grid does not hold the posterior: {:.1} % of the draws are outside ({axes}), and the landscape's \
-            intervals \
-             are of what is inside",
+            "{:.1} % of the draws lie outside the grid ({axes}), whose intervals cover the inside only: widen its axes",
             100.0 * comparison.outside
         ));
     }
     let coarse = named(&|one| one.spacing.filter(|s| *s > COARSE), &|name, s| format!("{name} {s:.1}"));
     if !coarse.is_empty() {
         notes.push(format!(
-            "the grid is coarse for integrals over it: spacing in error bars of the chain: {}",
+            "the grid is coarse (node spacing in error bars of the chain: {}): integrals are approximate",
             coarse.join(", ")
         ));
     }
     if comparison.cost.landscape.failed > 0 {
         let failed = comparison.cost.landscape.failed;
-        notes.push(format!("{failed} nodes without a value count as impossible in the landscape's intervals"));
+        notes.push(format!("{failed} nodes without a value have zero probability in the grid's intervals"));
     }
     let [run, grid] = &comparison.versions;
     if run != grid {
-        notes.push(format!("the chain was made by version {run} of the program, the landscape by {grid}"));
+        notes.push(format!("the chain was made by version {run} of the program, the grid by {grid}"));
     }
     notes
 }

@@ -45,7 +45,7 @@ pub enum PairError {
     #[error(transparent)]
     Journal(#[from] JournalError),
     /// The landscape is not whole.
-    #[error("{}: {found} of {total} nodes: finish the landscape first, with --resume", folder.display())]
+    #[error("{}: {found} of {total} nodes: finish the grid first, with --resume", folder.display())]
     Unfinished {
         /// Folder of the landscape.
         folder: PathBuf,
@@ -115,7 +115,7 @@ const TURNS: i32 = 10;
 /// The first thing that keeps a run from being of the same posterior as a landscape.
 fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_settings: &Settings) -> Option<String> {
     let (run, grid) = (&manifest.origin, &header.origin);
-    let both = |d: Difference| format!("{} ({} in the run, {} in the landscape)", d.key, d.first, d.second);
+    let both = |d: Difference| format!("{} ({} in the run, {} in the grid)", d.key, d.first, d.second);
     let model = |settings: &Settings| settings.imaging.objective.properties().name;
     let same_method = model(settings) == model(grid_settings);
     // two models have images, zero points and spots of their own: they are what is compared
@@ -127,7 +127,7 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
         return Some(both(key));
     }
     if let Some(name) = header.grid.names().find(|name| !manifest.names.iter().any(|sampled| sampled == name)) {
-        return Some(format!("{name} is an axis of the landscape and not sampled in the run"));
+        return Some(format!("{name} is an axis of the grid and not sampled in the run"));
     }
     let of_both = |p: &Parameter| same_method || !p.is_of_field();
     let fixed = |p: &Parameter| of_both(p) && !manifest.names.iter().any(|name| name == p.name());
@@ -135,7 +135,7 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(differ) {
         let number = |of: &Settings| of.values.get(p).map_or("nothing".to_owned(), |value| value.to_string());
         let (first, second) = (number(settings), number(grid_settings));
-        return Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", p.name()));
+        return Some(format!("{} is fixed at {first} in the run and at {second} in the grid", p.name()));
     }
     if run.data_sha256 != grid.data_sha256 {
         let key = config::section_difference("observations", &run.config, &grid.config).map(both);
@@ -145,9 +145,7 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     let maps = [run, grid].map(|origin| origin.measured.seasons.len().max(1));
     (same_method && maps[0] != maps[1]).then(|| {
         let [first, second] = maps;
-        format!(
-            "maps of the star: {first} in the run, {second} in the landscape (one is by an older program: repeat it)"
-        )
+        format!("maps of the star: {first} in the run, {second} in the grid (one is by an older program: repeat it)")
     })
 }
 
@@ -156,5 +154,5 @@ fn injected(run: &Origin, grid: &Origin) -> Option<String> {
     let (first, second) = (run.truth.as_ref()?, grid.truth.as_ref()?);
     let differs = |(name, value): &(&String, &f64)| second.get(*name) != Some(*value);
     let (name, value) = first.iter().find(differs)?;
-    Some(format!("injected {name} {value} in the run and {} in the landscape", second.get(name)?))
+    Some(format!("injected {name} {value} in the run and {} in the grid", second.get(name)?))
 }

@@ -65,7 +65,7 @@ fn cost(cost: &Cost) -> String {
     let seconds = |seconds: Option<f64>| seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.1} s"));
     format!(
         "chain: {} reconstructions{}, {:.0} model applications each in the median, {} in all{draws}\n\
-         landscape: {} reconstructions{}, {} model applications each in the median, {} in all{used}\n",
+         likelihood grid: {} reconstructions{}, {} model applications each in the median, {} in all{used}\n",
         chain.reconstructions,
         seconds(chain.seconds),
         chain.model_applications_median,

@@ -104,36 +104,34 @@ impl LimitsFile {
         let mut doubts = Vec::new();
         match &shortcut.found.change {
             Some(Ok(change)) if change.is_changing() => {
-                doubts.push(format!("these limits do not hold: {}", change.sentence()));
+                doubts.push(format!("Limits invalid: {}", change.sentence()));
             }
-            Some(Err(error)) => doubts.push(format!("whether the star changes is not known: {error}")),
+            Some(Err(error)) => doubts.push(format!("Spot evolution could not be tested: {error}")),
             _ => {}
         }
         if self.removed.is_none() && self.before.false_alarm_probability < CANDIDATE_FAP {
             doubts.push(format!(
-                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: \
-                without --with-best it is taken out first",
+                "The profiles contain a candidate at {:.4} d, which counts as recovered near its period: omit \
+                --with-best to subtract it",
                 self.before.period_d
             ));
         }
         if let Some(after) = self.after.filter(|after| after.false_alarm_probability < CANDIDATE_FAP) {
             doubts.push(format!(
-                "without that orbit the profiles show another one, of {:.4} d (false-alarm probability {}), which \
-                counts as recovered near its period",
+                "A second candidate at {:.4} d (FAP {}) remains and counts as recovered near its period",
                 after.period_d,
                 probability(after.false_alarm_probability)
             ));
         }
         if !shortcut.found.planet_free.on_target {
-            doubts.push("no map reaches the target chi2 without turning noise into spots".into());
+            doubts.push("No map reaches the target chi2 without fitting noise: set sigma_scale to \"auto\"".into());
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) =
             self.agreement.filter(|a| a.by_shortcut.abs_diff(a.by_full) as f64 > (a.orbits as f64).sqrt())
         {
             doubts.push(format!(
-                "the shortcut recovers {by_shortcut}, the whole way {by_full} of {orbits} orbits ({agree} alike): \
-                trust the whole \
-                 way"
+                "Linearised: {by_shortcut}, full pipeline: {by_full} of {orbits} orbits recovered ({agree} agree): \
+                trust the full pipeline"
             ));
         }
         doubts
@@ -165,14 +163,13 @@ impl LimitsFile {
         }
         let mut text = aligned(&rows);
         text += &format!(
-            "K (km/s) recovered, false alarms below {} % and the right period, at 50 and 95 % of {} phases\n",
+            "K (km/s) recovered (FAP < {} %, right period) at 50 and 95 % of {} phases\n",
             100.0 * self.false_alarm_probability,
             self.phases
         );
         if let Some(orbit) = self.removed {
             text += &format!(
-                "taken out first: the orbit that the profiles show, {:.4} d, K = {:.4} km/s (false-alarm probability \
-                {})\n",
+                "subtracted first: candidate at P = {:.4} d, K = {:.4} km/s (FAP {})\n",
                 self.before.period_d,
                 -orbit.k_kms,
                 probability(self.before.false_alarm_probability)
@@ -180,8 +177,8 @@ impl LimitsFile {
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) = self.agreement {
             text += &format!(
-                "the whole way: {by_full} of {orbits} orbits near the limit recovered, by the shortcut {by_shortcut}; \
-                {agree} alike\n"
+                "full pipeline: {by_full} of {orbits} orbits near the limit recovered; linearised: {by_shortcut}; \
+                {agree} agree\n"
             );
         }
         for warning in &self.warnings {

@@ -66,7 +66,7 @@ impl SpotsSource {
         match self {
             SpotsSource::Fitted => "fitted to the profiles there are",
             SpotsSource::Given => "of the config",
-            SpotsSource::Usual => "usual where imaging.spot_amplitude, spot_slope or spot_lifetime_d do not say",
+            SpotsSource::Usual => "default where imaging.spot_amplitude, spot_slope or spot_lifetime_d is not given",
         }
     }
 }
@@ -124,10 +124,10 @@ impl Campaign {
             .with("imaging.seasons", json!([]));
         let settings = config.settings()?;
         let [set] = &settings.sets[..] else {
-            return Err(own.fault("observations", "a list of data sets: a plan is of a single one").into());
+            return Err(own.fault("observations", "a list of data sets: give a single one").into());
         };
         if let Some(curve) = settings.light_curves.first() {
-            return Err(own.fault(&curve.key, "a plan knows no light curves: leave it out").into());
+            return Err(own.fault(&curve.key, "light curves are not planned: delete it").into());
         }
         let simulated = matches!(set.source, ObservationSource::Simulate(_));
         let taken = match (&settings.plan, simulated) {

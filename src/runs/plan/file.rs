@@ -257,9 +257,9 @@ impl ScheduleRecord {
     /// Spots, and what there is after more and more nights and at some periods.
     fn table(&self) -> String {
         let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms, .. } = self.spots;
-        let lives = spot_lifetime_d.map_or("that do not change".into(), |d| format!("that live {d:.1} d"));
+        let lives = spot_lifetime_d.map_or("static".into(), |d| format!("lifetime {d:.1} d"));
         let mut text = format!(
-            "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); velocity jitter \
+            "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); RV jitter \
             {velocity_jitter_kms} km/s; S/N {:.0}\n\n",
             source.words(),
             self.snr
@@ -299,19 +299,17 @@ impl ScheduleRecord {
             .filter_map(|at| at.imitated.as_ref().map(|words| format!("{} d ({words})", at.period_d)))
             .collect();
         if !hard.is_empty() {
-            sentences.push(format!("Spots may imitate orbits of {}.", hard.join(", ")));
+            sentences.push(format!("Degenerate with spot modulation: {}.", hard.join(", ")));
         }
         if !self.window.is_empty() {
             let peak = |peak: &WindowRecord| format!("{:.3}/d ({:.2})", peak.frequency_per_d, peak.height);
             let peaks: Vec<String> = self.window.iter().take(4).map(peak).collect();
-            sentences.push(format!(
-                "Orbits are hard to tell from those whose frequency differs by {}: window function in brackets.",
-                peaks.join(", ")
-            ));
+            sentences
+                .push(format!("Aliases: frequencies shifted by {} (window function in brackets).", peaks.join(", ")));
         }
         if !sentences.is_empty() {
             let percent = 100.0 * false_alarm_probability;
-            sentences.push(format!("Detected: false alarms below {percent} % in a search of all periods."));
+            sentences.push(format!("Detected: FAP < {percent} % in a blind search."));
         }
         sentences
     }

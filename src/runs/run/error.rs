@@ -36,7 +36,7 @@ pub enum RunError {
     #[error(transparent)]
     UnresolvedSpots(#[from] UnresolvedSpotsError),
     /// Several runs joined have no common random numbers to go on with.
-    #[error("{}: several runs joined; go on with each of them, and join them again", .0.display())]
+    #[error("{}: a merged run: extend its runs, then merge again", .0.display())]
     Merged(PathBuf),
     /// It was stopped before there was anything to write.
     #[error("interrupted before the first step; nothing was written")]

@@ -14,7 +14,7 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
     let mut advice = Vec::new();
     if chain.shape().ensembles < 2 {
         advice.push(
-            "one ensemble alone cannot be judged, R-hat only compares its two halves: set `sampler.ensembles` \
+            "convergence needs several ensembles (R-hat compares two halves only): set `sampler.ensembles` \
             to 2 or more"
                 .to_owned(),
         );
@@ -26,17 +26,15 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
         let count = convergence.stuck.len();
         advice.push(format!(
             "{count} stuck walker(s), not moved since half of the steps kept: {which}; look at their log_prob, and \
-            start anew \
-             closer to the optimum if they sit in a minor mode"
+            restart closer to the optimum if they are in a minor mode"
         ));
     }
     let (failures, evaluations) = (chain.failures(), chain.evaluations());
     if failures as f64 > MANY_FAILURES * evaluations as f64 {
         let share = 100.0 * failures as f64 / evaluations as f64;
         advice.push(format!(
-            "{failures} of {evaluations} evaluations failed ({share:.1} %): the posterior may be cut where they did; \
-            narrow \
-             the priors or loosen the chi2 target"
+            "{failures} of {evaluations} evaluations failed ({share:.1} %): the posterior may be truncated there; \
+            narrow the priors or raise the chi2 target"
         ));
     }
     advice

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 pub struct SamplerSettings {
     /// Number of independent ensembles. Convergence is judged between them, so at least 2, better 4.
     pub ensembles: usize,
-    /// Walkers of each ensemble: even, at least 4 and at least twice the number of sampled parameters. Without it 32,
-    /// and where all maps are integrated over 16, as an evaluation takes some 0.1 s there; or twice the number of
-    /// sampled parameters, if that is more.
+    /// Walkers of each ensemble: even, at least 4 and at least twice the number of sampled parameters. Default: 32, or
+    /// 16 with objective "marginal-likelihood" (some 0.1 s per evaluation); twice the number of sampled parameters, if
+    /// that is more.
     pub walkers: Option<usize>,
     /// Step limit. The chain ends earlier once every parameter has reached both goals, `rhat` and `ess`.
     pub steps: usize,

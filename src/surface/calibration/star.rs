@@ -8,8 +8,8 @@
 use crate::model::{Parameter, ParameterValues};
 use crate::star::LocalLine;
 use crate::surface::Known;
-use crate::surface::evolving_map::star::{FittedStar, StarPrior, coarsely, fit_star};
 use crate::surface::evolving_map::NoFit;
+use crate::surface::evolving_map::star::{FittedStar, StarPrior, coarsely, fit_star};
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 
@@ -81,12 +81,7 @@ impl MeasuredStar {
     ///
     /// # Errors
     /// [`NoFit`].
-    pub fn of(
-        imager: &Imager,
-        mut values: ParameterValues,
-        known: Known,
-        fitted: &[Parameter],
-    ) -> Result<Self, NoFit> {
+    pub fn of(imager: &Imager, mut values: ParameterValues, known: Known, fitted: &[Parameter]) -> Result<Self, NoFit> {
         values.set(Parameter::K, 0.0);
         let plain = coarsely(imager, values, known)?;
         let star = imager.star.with(&values.surface);

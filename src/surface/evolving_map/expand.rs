@@ -74,7 +74,8 @@ impl Marginal {
         }
         let common = imager.common_velocities(quadratic.gradient.len());
         let columns = DMatrix::from_columns(&common.iter().map(|one| one.of_each.clone()).collect::<Vec<_>>());
-        let of_each = |number: fn(&CommonVelocity) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
+        let of_each =
+            |number: fn(&CommonVelocity) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
         let (mean, sd) = (of_each(|one| one.mean_kms), of_each(|one| one.sd_kms));
         let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
         Ok(self.expanded(imager, stellar, quadratic))

@@ -107,15 +107,11 @@ pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Resul
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn fit_star(
-    imager: &Imager,
-    near: &Fitted,
-    known: &Known,
-    priors: &[StarPrior],
-) -> Result<FittedStar, FieldError> {
+pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPrior]) -> Result<FittedStar, FieldError> {
     let assumed = near.marginal.assumed;
     let area = |prior: &&StarPrior| prior.parameter == Parameter::RegionArea;
-    let area = priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
+    let area =
+        priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
     let area = area.unwrap_or(1.0);
     let ends = |prior: &StarPrior| match prior.parameter {
         Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
@@ -130,7 +126,10 @@ pub fn fit_star(
     let free = known.free(&assumed).into_iter().chain([line_is_fitted]).collect();
     let climb = Climb { imager, basis, known, priors, free, limits };
     let of_star = priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
-    let place = DVector::from_iterator(OF_FIELD + priors.len(), place_of_field(&assumed).into_iter().copied().chain([size_at_first.ln()]).chain(of_star));
+    let place = DVector::from_iterator(
+        OF_FIELD + priors.len(),
+        place_of_field(&assumed).into_iter().copied().chain([size_at_first.ln()]).chain(of_star),
+    );
     let first = climb.condensed_at(&place, &near.marginal, None)?;
     climb.up(first)
 }
@@ -176,12 +175,7 @@ impl Climb<'_> {
         self.condensed_at(place, near, Some(&near.design))
     }
 
-    fn condensed_at(
-        &self,
-        place: &DVector<f64>,
-        near: &Marginal,
-        like: Option<&Design>,
-    ) -> Result<Point, FieldError> {
+    fn condensed_at(&self, place: &DVector<f64>, near: &Marginal, like: Option<&Design>) -> Result<Point, FieldError> {
         let imager = &Imager { mean_profile: place[SIZE].exp(), ..self.imager.clone() };
         let mut values = near.values;
         let numbers = self.numbers(place, &values);
@@ -310,10 +304,11 @@ impl Climb<'_> {
         let mut damping = DAMPING;
         bend = self.with_field(&here, &of_field)?;
         let mut learnt = false;
-        for step in 0..STEPS {
+        for _ in 0..STEPS {
             let pushes = |i: usize| {
                 let (low, high) = self.limits[i];
-                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0) || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
+                (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
+                    || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
             };
             let moves: Vec<bool> = (0..count).map(|i| self.is_free(i) && !pushes(i)).collect();
             let inside = DVector::from_fn(count, |i, _| if moves[i] { gradient[i] } else { 0.0 });
@@ -333,9 +328,6 @@ impl Climb<'_> {
                 }
                 continue;
             };
-            if std::env::var("DIMCMC_TRACE").is_ok() {
-                eprintln!("{step} height {:.2} hoped {hoped:.2} damping {damping:.3} place {:.3?} gradient {:.2?}", here.height, here.place.as_slice(), gradient.as_slice());
-            }
             if hoped < GAIN {
                 break;
             }
@@ -370,13 +362,20 @@ impl Climb<'_> {
         };
         let of_star = (OF_FIELD, self.priors.len());
         let jacobian = self.jacobian(&here);
-        let covariance = &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
+        let covariance =
+            &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
         let sd = covariance.diagonal().map(f64::sqrt);
         let numbers = self.numbers(&here.place, &here.marginal.values);
         let ln_prior = self.ln_prior(&numbers);
         let sd = sd.iter().copied().collect();
         let mean_profile = Some(here.place[SIZE].exp()).filter(|size| *size > 1.5 * MEAN_PROFILES.0).unwrap_or(0.0);
-        Ok(FittedStar { values: here.marginal.values, sd, mean_profile, ln_evidence: here.marginal.ln_evidence(), ln_prior })
+        Ok(FittedStar {
+            values: here.marginal.values,
+            sd,
+            mean_profile,
+            ln_evidence: here.marginal.ln_evidence(),
+            ln_prior,
+        })
     }
 
     /// The point at the end of a step, where it is higher.

@@ -51,7 +51,7 @@ pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
 pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
     match value.abs() <= most {
         true => Ok(()),
-        false => Err(Fault::new(key, format!("{value} is beyond sense: at most {most:e}, up or down"))),
+        false => Err(Fault::new(key, format!("{value} must be from -{most:e} to {most:e}"))),
     }
 }
 

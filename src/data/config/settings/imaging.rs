@@ -11,7 +11,7 @@ use crate::surface::Properties;
 const MOST_BREAK_DEGREE: f64 = 30.0;
 
 /// What is said of spots where one map is found.
-const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
+const OF_INTEGRATED_MAPS: &str = "only for imaging.objective \"marginal-likelihood\"";
 
 /// That what a map holds is said of a static one; the usual model need not be mentioned.
 pub(super) fn check_brightness(imaging: &mut ImagingSettings) -> Result<(), Fault> {
@@ -42,18 +42,16 @@ pub(super) fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -
         return Err(Fault::new("imaging.default_spot", problem));
     }
     if !has_target && imaging.chi2_target.is_word() {
-        let problem = "auto is for one map of a star that does not change, not for imaging.objective \
-                       \"marginal-likelihood\", the default: leave it out, or give the objective \"spottedness\"";
+        let problem = "auto is for static maps, not for imaging.objective \"marginal-likelihood\", the default: \
+        delete it, or set \"spottedness\"";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if imaging.nuisances.is_some() && imaging.chi2_target.is_word() {
-        let problem =
-            "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
+        let problem = "auto uses RVs, which nuisances of line and continuum absorb: give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if !jitter.is_default() && imaging.chi2_target.is_word() {
-        let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
-                       give a number, such as 0.97";
+        let problem = "auto uses RVs, which observations.velocity_jitter_kms affects: give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if let Some(priors) = &imaging.nuisances {
@@ -69,11 +67,11 @@ fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
     let given = [(gap.is_some(), GAP), (!seasons.is_empty(), "imaging.seasons")].map(|(is, key)| is.then_some(key));
     match (given, imaging.objective.properties().map_changes) {
         ([Some(key), _] | [None, Some(key)], true) => {
-            let problem = "leave it out: with imaging.objective \"marginal-likelihood\", the default, spots change \
-                           all the time; for a map of each season give the objective \"spottedness\"";
+            let problem = "delete it: with imaging.objective \"marginal-likelihood\", the default, spots evolve \
+            continuously; for one map per season set \"spottedness\"";
             return Err(Fault::new(key, problem));
         }
-        ([Some(_), Some(key)], _) => return Err(Fault::new(key, "stands in place of season_gap_d: give one of them")),
+        ([Some(_), Some(key)], _) => return Err(Fault::new(key, "replaces season_gap_d: give one of them")),
         _ => {}
     }
     if let Some(gap) = gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
@@ -110,7 +108,7 @@ pub(super) fn resolve_field(written: &mut Config, values: &mut ParameterValues) 
                 return Err(Fault::new(format!("imaging.{name}"), "only spot_lifetime_d may be \"static\""));
             }
             Hyperparameter::Word(OfField::Static) if prior || axis => {
-                let problem = "\"static\" spots live for ever, and their lifetime cannot be free";
+                let problem = "\"static\" spots have no lifetime that could be free";
                 return Err(Fault::new(format!("imaging.{name}"), problem));
             }
             Hyperparameter::Word(OfField::Static) => {}

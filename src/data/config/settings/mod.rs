@@ -230,7 +230,7 @@ impl Settings {
     /// # Errors
     /// If the config has no `grid`.
     pub fn require_grid(&self) -> Result<&GridSettings, ConfigError> {
-        self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
+        self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a likelihood grid needs its axes"))
     }
 
     /// Whether profiles of `star` in velocity bins of `step_kms` can be computed at `values`.

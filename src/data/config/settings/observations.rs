@@ -121,19 +121,19 @@ fn check_several(written: &Config) -> Result<(), Fault> {
     for (s, section) in sections.iter().enumerate() {
         let key = written.observations.key(s);
         if sections.len() == 1 && section.zero_point_kms.is_word() {
-            let problem = "of one data set alone the zero point is the systemic velocity: see star.vsys_kms";
+            let problem = "the RV offset of a single data set is the systemic velocity: see star.vsys_kms";
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
         if section.zero_point_kms.is_word() && !objective.properties().marginalises {
             let problem = format!(
-                "with {:?} a map would follow a wrong zero point: give a number (km/s), or take \
-                 imaging.objective \"marginal-likelihood\", which integrates it out",
+                "with {:?} a map would absorb a wrong RV offset: give a number (km/s), or set imaging.objective \
+                \"marginal-likelihood\", which marginalises over it",
                 objective.name()
             );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
         if section.nuisances.is_some() && written.imaging.chi2_target.is_word() && objective.properties().has_target {
-            let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
+            let problem = format!("auto uses RVs, which {key}.nuisances absorb: give a number, such as 0.97");
             return Err(Fault::new("imaging.chi2_target", problem));
         }
         let spots = written.imaging.brightness() != BrightnessModel::BrightAndDark;

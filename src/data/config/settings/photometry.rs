@@ -45,7 +45,7 @@ pub(super) fn resolve_photometry(written: &Config, config: &Path) -> Result<Vec<
     let Some(photometry) = &written.photometry else { return Ok(Vec::new()) };
     if !written.imaging.objective.properties().takes_light_curves {
         let problem = format!(
-            "imaging.objective {:?} does not know of light curves: they take \"marginal-likelihood\"",
+            "imaging.objective {:?} has no model of light curves: set \"marginal-likelihood\"",
             written.imaging.objective.name()
         );
         return Err(Fault::new("photometry", problem));

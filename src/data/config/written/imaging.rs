@@ -17,46 +17,43 @@ const SEASON_GAP_D: f64 = 60.0;
 pub struct ImagingSettings {
     /// Pixels of the image, 100 to 2,000,000 (approximately: rings hold whole numbers of pixels).
     pub pixels: usize,
-    /// With objectives of a static map: what its pixels hold, spots alone if not given. With "marginal-likelihood", the
-    /// default, it has no meaning: spots may be brighter or darker than the photosphere.
+    /// With objectives of a static map: its brightness model, spots only if not given. Not with "marginal-likelihood",
+    /// the default, whose maps may be brighter or darker than the photosphere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub brightness: Option<BrightnessModel>,
-    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and
-    /// dark pixels has no use for it.
+    /// Default spot filling factor of a pixel without data, above 0 and below 0.5; unused by bright-and-dark maps.
     pub default_spot: f64,
-    /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over,
-    /// observed minus modelled, stop shrinking, at the config's values.
+    /// Target chi2 per datum, above 0. "auto": the highest value below which the rms of the filtered radial velocities
+    /// (observed minus modelled first moments) stops decreasing, at the config's values.
     pub chi2_target: Automatic,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
-    /// With objectives of a star that does not change: a longer gap between profiles (d), above 0, begins another
-    /// season, which has a map of its own. If not given, 60.
+    /// With objectives of a static map: a longer gap between profiles (d), above 0, begins another season, which has
+    /// its own map. If not given, 60.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub season_gap_d: Option<f64>,
     /// In place of `season_gap_d`: the seasons as `[start, end]` (d), one after the other.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub seasons: Vec<[f64; 2]>,
-    /// With objective "marginal-likelihood": standard deviation of the spot filling factor before the data, from 0.01
-    /// to 1.5.
+    /// With objective "marginal-likelihood": prior standard deviation of the spot filling factor, from 0.01 to 1.5.
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_amplitude: Hyperparameter,
-    /// With objective "marginal-likelihood": how fast the spots' power falls with the degree of the harmonics, from 0
-    /// (small spots) to 3 (large ones).
+    /// With objective "marginal-likelihood": power-law index of the angular power spectrum of the spots, from 0 (small
+    /// spots) to 3 (large ones).
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_slope: Hyperparameter,
-    /// With objective "marginal-likelihood": degree of the harmonics below which the spots' power does not rise any
-    /// more, from 0 (a power law all the way) to 30. If not given, 0 or 7 (spots of 10 to 25 degrees, here and there),
-    /// whichever has the higher evidence; 0 with a number as `spot_slope`.
+    /// With objective "marginal-likelihood": turnover degree of the angular power spectrum, flat below it, from 0 (a
+    /// pure power law) to 30. If not given, 0 or 7 (spots of 10 to 25 degrees), whichever has the higher evidence; 0
+    /// with a number as `spot_slope`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spot_break_degree: Option<f64>,
-    /// With objective "marginal-likelihood": how long spots live, from 0.3 to 3000 d, or "static".
+    /// With objective "marginal-likelihood": spot lifetime, from 0.3 to 3000 d, or "static".
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_lifetime_d: Hyperparameter,
-    /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has
-    /// them.
+    /// Unresolved-spot noise of a chain. Likelihood grids and optima use "entropy".
     pub unresolved_spots: UnresolvedSpots,
-    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors
-    /// around 0, from 0 (no nuisance) to 10.
+    /// Nuisance parameters of line and continuum per profile, marginalised over: standard deviations of their Gaussian
+    /// priors around 0, from 0 (no nuisance) to 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nuisances: Option<LineAndContinuum>,
 }

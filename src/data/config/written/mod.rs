@@ -19,8 +19,8 @@ pub use observations::{ObservationsSection, SimulateSection, VelocitySection};
 pub use per_parameter::{PerParameter, Planet};
 pub use photometry::{OutlierTreatment, PhotometrySection, SEGMENT_GAP_D, SimulatedLight};
 pub use star::{
-    Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM,
-    VelocityDrift,
+    Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star, USUAL_LIMB_DARKENING,
+    USUAL_WAVELENGTH_NM, VelocityDrift,
 };
 
 use crate::data::simulate::Schedule;
@@ -45,13 +45,12 @@ pub struct Config {
     /// The planet; without it there is none (K = 0). Where a parameter is free, this is the start.
     #[serde(default)]
     pub planet: Planet,
-    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its
-    /// own.
+    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets.
     pub observations: Listed<ObservationsSection>,
     /// Light curves of the star, with objective "marginal-likelihood": one, or a list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photometry: Option<Listed<PhotometrySection>>,
-    /// What is planned beside the observations.
+    /// Profiles to be planned beside the observations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<PlanSection>,
     /// The Doppler image.
@@ -63,7 +62,7 @@ pub struct Config {
     /// The chain.
     #[serde(default)]
     pub sampler: SamplerSettings,
-    /// The landscape that `dimcmc grid` computes.
+    /// The likelihood grid of `dimcmc grid`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<Grid>,
 }
@@ -131,8 +130,8 @@ pub struct PlanSection {
     pub snr: Option<f64>,
 }
 
-/// The landscape that `dimcmc grid` computes: ln L of the reconstructions, without priors. All parameters without an
-/// axis are fixed at their values under `star` and `planet`, those with a prior too.
+/// The likelihood grid of `dimcmc grid`: ln L of the maps, without priors. Parameters without an axis are fixed at
+/// their values under `star` and `planet`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {

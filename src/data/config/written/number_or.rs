@@ -20,15 +20,14 @@ pub enum NumberOr<W> {
 pub type Automatic = NumberOr<Auto>;
 /// Equivalent width of the local line; automatic: the mean area of the observed profiles.
 pub type EquivalentWidth = Automatic;
-/// Standard deviation of the velocity zero points of the profiles (km/s), 0 for none; fitted: what the profiles say, at
-/// the config's values.
+/// RV jitter of the profiles (km/s), 0 for none; fitted: fitted to the profiles, at the config's values.
 pub type VelocityJitter = NumberOr<FittedJitter>;
-/// Velocity that all profiles of a data set have too much (km/s), 0 for none; fitted: integrated out.
+/// RV offset of a data set (km/s), 0 for none; fitted: marginalised over.
 pub type ZeroPoint = NumberOr<FittedOffset>;
-/// A hyperparameter of the field of spots; fitted: that for which the profiles are most probable.
+/// A hyperparameter of the field of spots; fitted: at the maximum of the marginal likelihood.
 pub type Hyperparameter = NumberOr<OfField>;
 
-/// A number of the star; fitted: that for which the profiles are most probable.
+/// A number of the star; fitted: at the maximum of the marginal likelihood.
 pub type OfStar = NumberOr<FittedStar>;
 
 /// "fitted", of a number of the star.
@@ -72,7 +71,7 @@ pub trait Word: Copy + PartialEq + 'static {
 impl Word for Auto {
     const WORDS: &'static [(&'static str, Self)] = &[("auto", Auto)];
     const EXPECTED: &'static str = "a number or \"auto\"";
-    const SCHEMA: [&'static str; 2] = ["Automatic", "A number above 0, or \"auto\": what the observations say."];
+    const SCHEMA: [&'static str; 2] = ["Automatic", "A number above 0, or \"auto\": measured on the observations."];
 
     fn bounds() -> Value {
         json!({ "exclusiveMinimum": 0 })
@@ -83,7 +82,7 @@ impl Word for FittedJitter {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedJitter)];
     const EXPECTED: &'static str = "a number or \"fitted\"";
     const SCHEMA: [&'static str; 2] =
-        ["VelocityJitter", "A number from 0 to 100 (km/s), or \"fitted\": what the profiles say."];
+        ["VelocityJitter", "A number from 0 to 100 (km/s), or \"fitted\": fitted to the profiles."];
 
     fn bounds() -> Value {
         json!({ "minimum": 0, "maximum": 100 })
@@ -93,7 +92,11 @@ impl Word for FittedJitter {
 impl Word for FittedOffset {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedOffset)];
     const EXPECTED: &'static str = "a number or \"fitted\"";
-    const SCHEMA: [&'static str; 2] = ["ZeroPoint", "A number from -100 to 100 (km/s), or \"fitted\": integrated out."];
+    const SCHEMA: [&'static str; 2] = [
+        "ZeroPoint",
+        "A number from -100 to 100 (km/s), or \"fitted\": marginalised \
+    over.",
+    ];
 
     fn bounds() -> Value {
         json!({ "minimum": -100, "maximum": 100 })
@@ -104,7 +107,7 @@ impl Word for FittedStar {
     const WORDS: &'static [(&'static str, Self)] = &[("fitted", FittedStar)];
     const EXPECTED: &'static str = "a number or \"fitted\"";
     const SCHEMA: [&'static str; 2] =
-        ["FittedStar", "A number, or \"fitted\": that for which the profiles are most probable."];
+        ["FittedStar", "A number, or \"fitted\": at the maximum of the marginal likelihood."];
 
     fn bounds() -> Value {
         json!({})
@@ -116,8 +119,7 @@ impl Word for OfField {
     const EXPECTED: &'static str = "a number, \"fitted\", or (a lifetime) \"static\"";
     const SCHEMA: [&'static str; 2] = [
         "Hyperparameter",
-        "A number, or \"fitted\": that for which the profiles are most probable. A lifetime may be \"static\" too: \
-         spots do not change.",
+        "A number, or \"fitted\": at the maximum of the marginal likelihood. A lifetime may be \"static\", too.",
     ];
 
     fn bounds() -> Value {

@@ -26,30 +26,30 @@ pub struct ObservationsSection {
     /// and `.`. "set1", "set2", ... if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config. Times are days,
-    /// of the middle of each exposure, all counted from one zero point: BJD_TDB, whole or less a constant. Velocities
-    /// are barycentric: those of the profiles, or what VRAD, which is subtracted from them, makes of them. Without the
-    /// correction the Earth's motion, up to 30 km/s, looks like an orbit.
+    /// The list of profiles, one `FILE TIME_DAYS [VRAD_KMS]` per line, relative to the folder of this config. Times are
+    /// mid-exposure, in days, on one time system (preferably BJD_TDB, optionally with a constant offset). Velocities
+    /// are barycentric, in the profiles or after subtraction of VRAD. Uncorrected, the Earth's motion of up to 30 km/s
+    /// mimics an orbit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_range_kms: Option<[f64; 2]>,
-    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what
-    /// the scatter of the continuum says and what a map at the config's values leaves over.
+    /// With `path`: factor on the uncertainties of the profiles, above 0; 1 if not given. "auto": the larger of two
+    /// factors, from the rms of the continuum and from the residuals of a map at the config's values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<Automatic>,
-    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and standard errors
-    /// are divided by it as they are read.
+    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and uncertainties
+    /// are divided by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub continuum_level: Option<f64>,
     /// With `path`: how the profiles are weighted against each other.
     #[serde(default, skip_serializing_if = "Weights::is_default")]
     pub weights: Weights,
-    /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
-    /// beside that of the bins. It should be small against the width of the local line. "fitted": as large as the
-    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the
-    /// objective "marginal-likelihood", and 0 with others.
+    /// RV jitter (km/s): standard deviation of a Gaussian velocity offset per profile. It should be small compared with
+    /// the width of the local line. "fitted": fitted to the profiles, under a static map once at the config's values.
+    /// If not given, "fitted" with the objective "marginal-likelihood", 0 with the others. All data sets share one
+    /// value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_jitter_kms: Option<VelocityJitter>,
     /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.
@@ -68,16 +68,14 @@ pub struct ObservationsSection {
     /// Line and continuum of each profile of this set, in place of `imaging.nuisances`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nuisances: Option<LineAndContinuum>,
-    /// Velocity (km/s) that all profiles of this set have too much, one number; 0 if not given. "fitted", for one of
-    /// several sets: integrated out, with a Gaussian prior of 3 km/s around 0; in maps it is held where it is most
-    /// probable.
+    /// RV offset (km/s) of this set, added to all its profiles; 0 if not given. "fitted", for one of several sets:
+    /// marginalised over with a Gaussian prior of 3 km/s around 0; maps hold it at its most probable value.
     #[serde(default, skip_serializing_if = "ZeroPoint::is_default")]
     pub zero_point_kms: ZeroPoint,
     /// With `path`: windows of time `[start, end]` (d), transits for example: profiles within are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<[f64; 2]>,
-    /// Simulated profiles of the star and planet of this config. Of several data sets the first one has the spots, for
-    /// all.
+    /// Simulated profiles of the star and planet of this config. In a list of data sets the first one has the spots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
 }
@@ -94,12 +92,12 @@ pub struct SimulateSection {
     #[serde(default)]
     #[schemars(inner(length(min = 4, max = 6)))]
     pub spots: Vec<Vec<f64>>,
-    /// Spots drawn at random, beside those that are listed.
+    /// Spots drawn at random, in addition to the listed ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub random_spots: Option<RandomSpots>,
-    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter
-    /// than the photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of
-    /// filling s overlaps, the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
+    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and brightness excess in units of
+    /// the photosphere, above 0 and up to 10. Where a spot of filling s overlaps, the excess is multiplied by 1 - s.
+    /// The larger excess counts where faculae overlap.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faculae: Vec<[f64; 4]>,
     /// Rotation cycles of the profiles, counted from `epoch_d`; this or `schedule`.
@@ -119,11 +117,11 @@ pub struct SimulateSection {
     /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
     #[serde(default = "default_simulation_pixels")]
     pub pixels: usize,
-    /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
+    /// Line and continuum errors per profile, drawn with the same seed; none if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub continuum: Option<ContinuumSection>,
-    /// Standard deviation (km/s), from 0 to 100, of the velocity zero points: one Gaussian number a profile, drawn with
-    /// the same seed and added to its velocity; 0 if not given.
+    /// RV jitter (km/s), from 0 to 100: standard deviation of one Gaussian velocity offset per profile, drawn with the
+    /// same seed; 0 if not given.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub velocity_jitter_kms: f64,
     /// Velocity (km/s), from -100 to 100, that is added to all profiles; 0 if not given.
@@ -163,7 +161,7 @@ fn default_simulation_pixels() -> usize {
     20_000
 }
 
-/// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
+/// Errors of line and continuum: standard deviations, from 0 to 10, of one Gaussian value per profile.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContinuumSection {

@@ -78,8 +78,8 @@ impl<T: JsonSchema> JsonSchema for PerParameter<T> {
     }
 }
 
-/// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is
-/// free, its value here is the start. What the table gives the planet as usual is always there.
+/// The planet's orbit, and that of a second planet if there is one; circular by default. Where a parameter is free, its
+/// value here is the start.
 #[derive(Clone, Debug, Serialize)]
 pub struct Planet(PerParameter<f64>);
 
@@ -145,8 +145,8 @@ impl JsonSchema for Planet {
             (row.key, value)
         };
         section(
-            "The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a \
-             parameter is\nfree, its value here is the start.",
+            "The planet's orbit, and that of a second planet if there is one; circular by default. Where a \
+            parameter is\nfree, its value here is the start.",
             Planet::rows().map(value),
         )
     }

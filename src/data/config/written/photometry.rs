@@ -15,10 +15,9 @@ pub struct PhotometrySection {
     /// `_` and `.`. "photometry" if not given, of several "photometry1", "photometry2", ...
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// A table as text, relative to the folder of this config, with a line of names of the columns: time (d), flux (or
-    /// magnitude) and its error, as `time,flux,sigma` or by the usual other names, such as BTJD, PDCSAP_FLUX, mag_err.
-    /// Days are counted as those of the profiles, unless the name has their zero point. Transits must be cut out, here
-    /// or by `exclude`.
+    /// A text table, relative to the folder of this config, with a header: time (d), flux (or magnitude) and its
+    /// uncertainty, as `time,flux,sigma` or other usual names, such as BTJD, PDCSAP_FLUX, mag_err. Times are in the
+    /// system of the profiles, unless the column name gives another. Transits must be cut out, here or by `exclude`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// Brightness of a spot over that of the photosphere in this band, from 0 and below 1; that of the star if not
@@ -32,8 +31,8 @@ pub struct PhotometrySection {
     /// Limb darkening in this band; that of the star if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limb_darkening: Option<LimbDarkeningSection>,
-    /// A gap longer than this (d), from 0 to 1000, begins a new segment. Each segment has a level and a slope of its
-    /// own, which are integrated out. Nights must not be segments.
+    /// A gap longer than this (d), from 0 to 1000, begins a new segment. Each segment has its own level and slope,
+    /// which are marginalised over. Nights must not be segments.
     #[serde(default = "default_gap_d")]
     pub segment_gap_d: f64,
     /// Factor on the standard errors, above 0.
@@ -42,8 +41,8 @@ pub struct PhotometrySection {
     /// Windows of time `[start, end]` (d) whose measurements are left out: transits, flares.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<[f64; 2]>,
-    /// What becomes of wild measurements: those more than 5 standard deviations from their neighbours within 1/12 of a
-    /// rotation, and flares. Dips of three and more are kept.
+    /// Treatment of outliers: measurements more than 5 standard deviations from their neighbours within 1/12 of a
+    /// rotation, and flares. Dips of three points and more are kept.
     #[serde(default, skip_serializing_if = "OutlierTreatment::is_default")]
     pub outliers: OutlierTreatment,
     /// A simulated light curve of the star that `observations.simulate` has.
@@ -51,14 +50,14 @@ pub struct PhotometrySection {
     pub simulate: Option<SimulatedLight>,
 }
 
-/// What becomes of wild measurements.
+/// Treatment of outliers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutlierTreatment {
-    /// They are left out, counted and named.
+    /// Outliers are rejected, counted and named.
     #[default]
     LeaveOut,
-    /// They are kept as the others.
+    /// Outliers are kept.
     Keep,
 }
 

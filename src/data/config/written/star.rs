@@ -31,8 +31,8 @@ pub struct Star<Period = f64> {
     /// Differential rotation: angular velocity of the equator minus that of the pole (rad/d).
     #[serde(default)]
     pub domega_rad_d: f64,
-    /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It
-    /// decides nothing else, and may be added to a run that is there; but two planets must be stable by it.
+    /// Mass of the star (solar masses), 0.01 to 200, for the minimum mass M sin i of the planet. It may be added to an
+    /// existing run. Two planets must be stable for this mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass_msun: Option<f64>,
     /// Limb darkening; linear with coefficient 0.65 if not given.
@@ -52,22 +52,22 @@ pub struct Star<Period = f64> {
     pub contrast: Option<f64>,
     /// The line of one surface element.
     pub line: Line,
-    /// Numbers of the star that are fitted to the profiles before maps and searches, with objective
-    /// "marginal-likelihood", beginning from their values here: of "line_sigma_kms", "equivalent_width_kms",
-    /// "vsini_kms" and "limb_darkening" any.
+    /// Stellar parameters fitted to the profiles before maps and searches, with objective "marginal-likelihood",
+    /// starting from their values here: any of "line_sigma_kms", "equivalent_width_kms", "vsini_kms" and
+    /// "limb_darkening".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<String>,
-    /// A drift of the velocities, integrated out with objective "marginal-likelihood": an outer companion, or the
-    /// spectrograph. "linear" where it is not given.
+    /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood".
+    /// "linear" if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_drift: Option<VelocityDrift>,
-    /// What differs in active regions beside their brightness. Fitted where it is not given, with objective
-    /// "marginal-likelihood"; otherwise spots are the photosphere, dimmed.
+    /// Active regions: their line and limb contrast. Fitted if not given, with objective "marginal-likelihood";
+    /// otherwise a spot is a dimmed photosphere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub regions: Option<RegionsSection>,
 }
 
-/// A drift of the velocities.
+/// Velocity drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VelocityDrift {
@@ -79,8 +79,8 @@ pub enum VelocityDrift {
     Quadratic,
 }
 
-/// What differs in active regions, spots with the plages around them, beside their brightness: their line, and how they
-/// look at the limb. `area`, `area_limb` and `dimming_limb` at 0 are spots that are the photosphere, dimmed.
+/// Active regions, spots with the plages around them: their line and limb contrast. With `area`, `area_limb` and
+/// `dimming_limb` at 0 a spot is a dimmed photosphere.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RegionsSection {
@@ -90,12 +90,11 @@ pub struct RegionsSection {
     pub equivalent_width: OfStar,
     /// Velocity of their line over that of the photosphere (km/s), positive to the red, -3 to 3.
     pub shift_kms: OfStar,
-    /// Surface with their line per unit of the spots' filling factor, 0 to 20.
+    /// Surface with their line per unit spot filling factor, 0 to 20.
     pub area: OfStar,
-    /// How much more of that surface there is at the limb: the change from the centre of the disc, -20 to 20.
+    /// Increase of that surface towards the limb: limb minus disc centre, -20 to 20.
     pub area_limb: OfStar,
-    /// How much darker they are at the limb: the change of one minus their brightness from the centre of the disc, -3
-    /// to 3.
+    /// Limb dimming: one minus their brightness, limb minus disc centre, -3 to 3.
     pub dimming_limb: OfStar,
 }
 

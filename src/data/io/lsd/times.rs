@@ -36,8 +36,7 @@ pub(super) type Fault = (usize, String);
 pub(super) fn check(entries: &[Entry]) -> Result<(), Fault> {
     entries.iter().try_for_each(of_sense)?;
     if let [only] = entries {
-        let problem =
-            "the only profile of the list: spots and velocities are told apart by how they change, list two or more";
+        let problem = "the only profile of the list: spots and RVs differ only in their variation, list two or more";
         return Err((only.line, problem.into()));
     }
     let mut sorted: Vec<&Entry> = entries.iter().collect();
@@ -51,13 +50,10 @@ pub(super) fn check(entries: &[Entry]) -> Result<(), Fault> {
 fn of_sense(entry: &Entry) -> Result<(), Fault> {
     let (time, vrad) = (entry.time_d, entry.vrad_kms);
     if time.abs() >= BEYOND_SENSE_D {
-        return Err((
-            entry.line,
-            format!("time {time:e} is beyond sense in days; divide seconds by {SECONDS_PER_DAY}"),
-        ));
+        return Err((entry.line, format!("time {time:e} is no time in days; divide seconds by {SECONDS_PER_DAY}")));
     }
     if vrad.abs() >= BEYOND_SENSE_KMS {
-        return Err((entry.line, format!("radial velocity {vrad:e} is beyond sense in km/s; divide m/s by 1000")));
+        return Err((entry.line, format!("radial velocity {vrad:e} is no velocity in km/s; divide m/s by 1000")));
     }
     Ok(())
 }
@@ -81,7 +77,7 @@ fn one_zero_point(sorted: &[&Entry]) -> Result<(), Fault> {
     let julian = |time: f64| (time - MJD_ZERO_D).abs() < OUR_TIME_D;
     let cure = match julian(time) != julian(other) {
         true => format!("a Julian date beside another count of days; MJD is JD - {MJD_ZERO_D}"),
-        false => "another zero point, or not days?".into(),
+        false => "another time system, or not days?".into(),
     };
     let years = (time - other).abs() / DAYS_PER_YEAR;
     Err((line, format!("time {time} is {years:.0} years from time {other} in line {other_line}: {cure}")))

@@ -150,7 +150,7 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
     let mut text = format!(
         "{TITLE} {}\n\n\
         {} velocities and their covariance, spots marginalised out. Times are days, as in the list of profiles.\n\
-        Velocities count from the systemic velocity {}\n\
+        Velocities are relative to the systemic velocity {}\n\
         Their errors and covariance do not include the error of what all profiles, or those of a data set, have in\n\
         common: leave a constant velocity free in every fit, for each data set.\n\n\
         radvel.csv           m/s   radvel: time, mnvel, errvel, tel\n\
@@ -171,7 +171,7 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
         let _ = writeln!(
             text,
             "sigma_K at {:.4} d (circular orbit, constant velocity free), over that with the full covariance:\n  \
-            as such a package would quote it: {quoted:.2}\n  as it would truly be: {achieved:.2}\n\
+            as quoted by such a package: {quoted:.2}\n  true uncertainty: {achieved:.2}\n\
             reduced chi2 of the best orbit that it would find on average: {reduced_chi2:.3} instead of 1",
             search.best.period_d
         );
@@ -183,6 +183,6 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
             velocities.times_d.len()
         );
     }
-    text += "\nA jitter that is fitted beside does not mend this: it is independent from night to night as well.\n";
+    text += "\nA fitted jitter does not correct this: it is independent from night to night, too.\n";
     text
 }

@@ -140,7 +140,7 @@ fn recover<F: Fn(&[f64]) -> f64 + Sync>(
     let (mut state, _) = sampler.start(&positions).map_err(|e| e.to_string())?;
     let mut sums = vec![[0.0; ENSEMBLES]; truths.len()];
     for step in 0..STEPS {
-        let records = sampler.step(&mut state, &AtomicBool::new(false)).expect("nobody asks to stop");
+        let records = sampler.step(&mut state, &AtomicBool::new(false)).expect("no stop is requested");
         for record in records.iter().filter(|_| step >= DISCARD) {
             sums.iter_mut().zip(truths).for_each(|(sum, truth)| sum[record.ensemble] += (truth.of)(&record.theta));
         }

@@ -9,7 +9,9 @@
 
 use super::mean::{HalfDepth, MeanProfile};
 use super::{LineModel, LookError};
-use crate::star::{LocalLine, Orbit, Quadrature, Regions, Response, Rotation, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::star::{
+    LocalLine, Orbit, Quadrature, Regions, Response, Rotation, Sampling, StarSettings, StarState, SurfaceGrid,
+};
 use nalgebra::{Matrix5, Vector5};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
