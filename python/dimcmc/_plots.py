@@ -269,7 +269,7 @@ def _values(numbers: Arrays) -> Array:
 
 
 def _surface(result: Result, numbers: Arrays, axes: Any) -> None:
-    """Maps in plate carrée projection: any projection of matplotlib needs axes of its own."""
+    """Maps in plate carrée projection: matplotlib projections need their own axes."""
     longitude, latitude = np.meshgrid(np.arange(1.0, 360.0, 2.0), np.arange(-89.0, 90.0, 2.0))
     rings = np.unique(numbers["latitude_deg"])
     ring = np.abs(latitude.ravel()[:, None] - rings).argmin(axis=1)

@@ -1,8 +1,8 @@
 //! What is wrong alike in all profiles of a data set: a line or a continuum that is not quite the star's. Smooth in
 //! velocity, of an unknown size, and integrated out, so that no spots stand in for it (`docs/method.md` section 9).
 //!
-//! It is a Gaussian process of squared-exponential covariance in the observer's velocities, by weights of Gaussians that
-//! stand side by side.
+//! It is a Gaussian process of squared-exponential covariance in the observer's velocities, by weights of Gaussians
+//! that stand side by side.
 
 use super::imaging::Imager;
 use nalgebra::DMatrix;

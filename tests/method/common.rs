@@ -47,6 +47,7 @@ pub fn oracle() -> Oracle {
             instrumental_sigma_kms: instrumental_sigma_kms(number("R")),
             ..LocalLine::gaussian(sigma_kms, number("ew"))
         },
+        regions: Default::default(),
     };
     let pixels = &json["pixels"];
     let table = |key: &str| numbers(&pixels[key]);
@@ -74,6 +75,8 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
         sets: vec![oracle.sampling.clone().into()],
         zero_points: Vec::new(),
         light_curves: Vec::new(),
+        mean_profile: 0.0,
+        drift: None,
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

@@ -44,6 +44,7 @@ fn with_line(
         limb_darkening: LimbDarkening::Linear(limb_darkening),
         contrast: 0.08,
         line: LocalLine::gaussian(sigma_kms, 5.8),
+        regions: Default::default(),
     };
     let mut truth = ParameterValues::of_eight([0.0; 8]);
     truth.set(Parameter::PorbOverProt, 2.0);

@@ -2,7 +2,8 @@
 
 use crate::common::{oracle, values};
 use dimcmc::internals::star::{
-    LimbDarkening, LocalLine, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid,
+    LimbDarkening, LocalLine, Orbit, Quadrature, Regions, Response, Rotation, Sampling, StarSettings, StarState,
+    SurfaceGrid,
 };
 
 fn state() -> StarState {
@@ -252,6 +253,7 @@ fn surface_parameters_stand_in_place_of_settings() {
         line_sigma_kms: Some(4.0),
         equivalent_width_kms: Some(7.0),
         contrast: Some(0.3),
+        ..Default::default()
     };
     let map: Vec<f64> = (0..grid.len()).map(|p| 1.0 + 0.3 * (p as f64).sin()).collect();
     let direct = Response::new(&grid, &other, &state(), &sampling);
@@ -260,4 +262,75 @@ fn surface_parameters_stand_in_place_of_settings() {
     assert_eq!(response.depths(&map), direct.depths(&map));
     assert_eq!(response.with_velocities(&oracle().star, &state, &[sampling.into()]).depths(&map), direct.depths(&map));
     assert_eq!((response.contrast(0), direct.contrast(0)), (0.3, 0.3));
+}
+
+/// A star with regions of their own line, which are smaller and brighter at the limb, by the formula: a sum over
+/// pixels, on a grid so fine that each is a point.
+#[test]
+fn regions_are_as_the_formula_says() {
+    let regions = Regions {
+        line_width: 1.4,
+        equivalent_width: 1.1,
+        shift_kms: 0.4,
+        area: 2.0,
+        area_limb: -0.7,
+        dimming_limb: -0.5,
+    };
+    let (q, u, inclination, vsini_kms, line) = (0.7, 0.65, 0.9f64, 30.0, LocalLine::gaussian(3.0, 5.0));
+    let star = StarSettings {
+        rotation_period_d: 3.0,
+        epoch_d: 0.0,
+        limb_darkening: LimbDarkening::Linear(u),
+        contrast: 1.0 - q,
+        line,
+        regions,
+    };
+    let state = StarState { inclination, vsini_kms, vsys_kms: 0.2, ..state() };
+    let state = StarState { rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.0 }, ..state };
+    let grid = SurfaceGrid::equal_area(40_000, Quadrature::Gauss2x2);
+    let filling: Vec<f64> = (0..grid.len())
+        .map(|p| if (grid.longitude[p] - 0.6).powi(2) + (grid.latitude[p] - 0.4).powi(2) < 0.2 { 0.8 } else { 0.0 })
+        .collect();
+    let (time_d, first_kms, step_kms, bins) = (0.4, -45.0, 1.8, 51);
+    let sampling = Sampling { step_kms, profiles: vec![(time_d, first_kms, bins)] };
+    let response = Response::new(&grid, &star, &state, &sampling);
+    let brightness: Vec<f64> = filling.iter().map(|x| 1.0 - q * x).collect();
+    let depths = response.depths(&brightness);
+    let gaussian = |sigma: f64, width: f64, v: f64| {
+        width / (sigma * std::f64::consts::TAU.sqrt()) * (-0.5 * (v / sigma).powi(2)).exp()
+    };
+    let shift_kms = state.vsys_kms + state.motion.velocity_kms(star.cycle(time_d));
+    let (mut sums, mut continuum) = (vec![0.0; bins], 0.0);
+    for (p, x) in filling.iter().enumerate() {
+        let (sin, cos) = grid.latitude[p].sin_cos();
+        let psi = grid.longitude[p] + 2.1 * time_d;
+        let mu = sin * inclination.cos() + cos * inclination.sin() * psi.cos();
+        if mu <= 0.0 {
+            continue;
+        }
+        let limb = 1.0 - mu;
+        let weight = grid.area[p] * mu * (1.0 - u * limb);
+        let dimming = q + regions.dimming_limb * limb;
+        let area = regions.area + regions.area_limb * limb;
+        for (j, sum) in sums.iter_mut().enumerate() {
+            let v = first_kms + j as f64 * step_kms - shift_kms - vsini_kms * cos * psi.sin();
+            let own = gaussian(3.0, 5.0, v);
+            let changed = gaussian(1.4 * 3.0, 1.1 * 5.0, v - regions.shift_kms);
+            *sum += weight * (own - x * (dimming * own - area * (changed - own)));
+        }
+        continuum += weight * (1.0 - x * dimming);
+    }
+    let deepest = depths.iter().copied().fold(0.0, f64::max);
+    for (depth, sum) in depths.iter().zip(&sums) {
+        assert!((depth - sum / continuum).abs() < 1e-3 * deepest, "{depth} {}", sum / continuum);
+    }
+    // and the transpose is one
+    let (mut line, mut level) = (vec![0.0; bins], [0.0]);
+    response.change(&filling, &mut line, &mut level);
+    let back: Vec<f64> = (0..bins).map(|j| (0.3 * j as f64).sin()).collect();
+    let mut out = vec![0.0; grid.len()];
+    response.apply_transpose(&back, &[0.7], &mut out);
+    let there: f64 = line.iter().zip(&back).map(|(a, b)| a * b).sum::<f64>() + 0.7 * level[0];
+    let again: f64 = out.iter().zip(&filling).map(|(a, b)| a * b).sum();
+    assert!((there - again).abs() < 1e-10 * again.abs(), "{there} {again}");
 }
