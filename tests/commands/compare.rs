@@ -110,10 +110,7 @@ fn what_the_grid_leaves_out_is_said() {
     // one axis of two: the other is fixed where the config has it
     other_grid(&desk, "/grid/axes", json!({ "k_kms": [0.15, 0.25, 11] }));
     let (table, found) = compared(&desk, "other");
-    says(
-        &table,
-        &["fixed at", "note: phi fixed in the landscape and sampled in the chain", "as fine a grid over all 2"],
-    );
+    says(&table, &["fixed at", "note: phi fixed in the grid, sampled in the chain", "as fine a grid over all 2"]);
     let phi = &found["parameters"]["phi"];
     assert_eq!((&phi["fixed_at"], &phi["landscape"], &phi["paraboloid"]), (&json!(0.0), &Value::Null, &Value::Null));
     assert_eq!(found["fixed_in_landscape"], json!(["phi"]));

@@ -258,7 +258,7 @@ fn seasons_that_make_no_sense_are_refused_by_their_key() {
     says(&Desk::new(bright).refusal(&["map", CONFIG, "--out", "map"]), &["observations[1].contrast", "bright"]);
     let mut integrated = two_sets();
     integrated["imaging"]["season_gap_d"] = json!(30);
-    says(&Desk::new(integrated).refusal(&["map", CONFIG, "--out", "map"]), &["imaging.season_gap_d", "leave it out"]);
+    says(&Desk::new(integrated).refusal(&["map", CONFIG, "--out", "map"]), &["imaging.season_gap_d", "delete it"]);
 }
 
 /// First moments of all profiles of a config (km/s).

@@ -72,7 +72,7 @@ fn values_and_conventions_are_taken_over() {
     says(
         &table,
         &[
-            "not taken over\n",
+            "not imported\n",
             "inzdi.dat:5             mass 0.9, radius 1.1",
             "inzdi.dat:20            default and limiting brightness",
             "star.line.gamma_kms",

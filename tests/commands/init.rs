@@ -48,7 +48,7 @@ fn the_config_is_taken_as_it_is() {
     says(
         &table,
         &[
-            "11 profiles of 49 bins of 2.700 km/s, from 100.000 to 106.120 (6.120 d); S/N 300 a bin",
+            "11 profiles of 49 bins of 2.700 km/s, from 100.000 to 106.120 (6.120 d); quoted S/N 300 per bin",
             "from the profiles\n",
             "given\n",
             "--rotation-period",

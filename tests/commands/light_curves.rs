@@ -119,7 +119,7 @@ fn a_wild_point_is_named_and_moves_no_planet() {
         _ => format!("{line}\n"),
     };
     desk.write("data/tess.csv", &table.lines().enumerate().map(high).collect::<String>());
-    let note = "1 wild point left out, which photometry.outliers \"keep\" brings back: 2.950 d (flux 0.997";
+    let note = "1 outlying point rejected (photometry.outliers \"keep\" keeps them): 2.950 d (flux 0.997";
     let wild = signal("wild", &["light curve: tess: ", note]);
     let sigma = good[1];
     assert!((wild[0] - good[0]).abs() < 0.1 * sigma && (wild[1] / sigma - 1.0).abs() < 0.03, "{good:?} {wild:?}");
@@ -128,11 +128,11 @@ fn a_wild_point_is_named_and_moves_no_planet() {
     config["photometry"]["outliers"] = json!("keep");
     desk.write("star.json", &config.to_string());
     let said = desk.succeed(&["map", "star.json", "--out", "kept"]);
-    assert!(!said.contains("wild point"), "{said}");
+    assert!(!said.contains("outlying point"), "{said}");
     let fit: Value = serde_json::from_str(&desk.read("kept/fit.json")).unwrap();
     says(&fit["warnings"].to_string(), &["light curve tess", "2.9", "sigma", "photometry.exclude"]);
     let fit: Value = serde_json::from_str(&desk.read("wild/periodogram.json")).unwrap();
-    says(&fit["measured"]["light_curve_notes"].to_string(), &["1 wild point"]);
+    says(&fit["measured"]["light_curve_notes"].to_string(), &["1 outlying point"]);
 }
 
 #[test]

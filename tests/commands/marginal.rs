@@ -45,7 +45,7 @@ fn a_landscape_is_that_of_the_chain_with_the_field_held() {
     says(&table, &["ln_evidence"]);
     desk.succeed(&["sample", CONFIG, "--out", "run"]);
     let said = desk.succeed(&["compare", "run", "grid", "--out", "comparison"]);
-    says(&said, &["spot_amplitude, spot_slope, spot_lifetime_d fixed in the landscape and sampled in the chain"]);
+    says(&said, &["spot_amplitude, spot_slope, spot_lifetime_d fixed in the grid, sampled in the chain"]);
     assert!(!said.contains("unresolved spots"), "{said}");
     // the paper's method beside it, of the same star and profiles
     let mut mapped = changing(1);

@@ -235,7 +235,10 @@ fn what_cannot_be_drawn_is_refused() {
     says(&desk.refusal(&["plot", "empty"]), &["empty", "nothing to draw", "map.json", "manifest.json"]);
     desk.write("map/figures", "mine");
     says(&desk.refusal(&["plot", "map"]), &["map/figures", "not a folder"]);
-    says(&desk.refusal(&["plot", "map", "--with", "run", "--out", "out"]), &["--with run: map holds no landscape"]);
+    says(
+        &desk.refusal(&["plot", "map", "--with", "run", "--out", "out"]),
+        &["--with run: map holds no likelihood grid"],
+    );
     desk.succeed(&["plot", "map", "--out", "out"]);
     desk.write("out/mine.txt", "precious");
     desk.refusal(&["plot", "map", "--out", "out"]);

@@ -14,6 +14,9 @@ use std::sync::Arc;
 /// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
 const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
 
+/// An amplitude of so much of its upper bound grows to it.
+const NEARLY: f64 = 0.95;
+
 /// From so much lower in ln Z no climb makes good.
 const FAR_BELOW: f64 = 5.0;
 
@@ -79,10 +82,10 @@ impl Fitted {
     }
 
     /// That spots are like that.
-    fn checked(self) -> Result<Self, NoFit> {
+    fn checked(self, known: &Known) -> Result<Self, NoFit> {
         let amplitude = self.marginal.assumed.field.spectrum.amplitude;
-        match self.at_bounds.contains(&Parameter::SpotAmplitude.name()) {
-            true if amplitude > BOUNDS[0].1 - 1e-9 => Err(NoFit::TooLarge(amplitude)),
+        match known.amplitude {
+            None if amplitude > NEARLY * BOUNDS[0].1 => Err(NoFit::TooLarge(amplitude)),
             _ if !self.ln_evidence.is_finite() => Err(NoFit::NotFinite),
             _ => Ok(self),
         }
@@ -117,7 +120,7 @@ pub fn fit(
     known: Known,
     near: Option<&Fitted>,
 ) -> Result<Fitted, NoFit> {
-    unchecked(imager, basis, values, known, near)?.checked()
+    unchecked(imager, basis, values, known, near)?.checked(&known)
 }
 
 fn unchecked(
