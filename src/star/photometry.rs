@@ -18,8 +18,8 @@ impl Band {
         self.contrast.unwrap_or_else(|| star.with(&state.surface).contrast)
     }
 
-    /// What a spot on each pixel dims the flux of the bare photosphere by, over its own dimming, the mean of these times
-    /// (d). Where spots are as dark at the limb these are the pixels' shares in the flux, and add up to 1.
+    /// What a spot on each pixel dims the flux of the bare photosphere by, over its own dimming, the mean of these
+    /// times (d). Where spots are as dark at the limb these are the pixels' shares in the flux, and add up to 1.
     pub fn shares(&self, grid: &SurfaceGrid, star: &StarSettings, state: &StarState, times_d: &[f64]) -> Vec<f64> {
         let (mut star, mut state) = (star.clone(), *state);
         if let Some(limb_darkening) = self.limb_darkening {

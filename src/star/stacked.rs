@@ -111,8 +111,8 @@ impl Response {
         }
     }
 
-    /// What [`Response::apply`] gives of maps that are another one in each data set, as the brightness of spots is: `fill` is given the first
-    /// profile of the set, and makes its `map`.
+    /// What [`Response::apply`] gives of maps that are another one in each data set, as the brightness of spots is:
+    /// `fill` is given the first profile of the set, and makes its `map`.
     pub fn apply_each(
         &self,
         map: &mut [f64],
@@ -132,10 +132,10 @@ impl Response {
         self.summed(out, |part, profiles, bins, out| part.apply_transpose(&line[bins], &continuum[profiles], out));
     }
 
-    /// The transpose of what `weigh` makes of the changes of line depth and continuum of every profile by `x`: given the
-    /// number of a profile, those of its bins, and of its continuum, it replaces the former, and returns what replaces
-    /// the latter. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads
-    /// comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
+    /// The transpose of what `weigh` makes of the changes of line depth and continuum of every profile by `x`: given
+    /// the number of a profile, those of its bins, and of its continuum, it replaces the former, and returns what
+    /// replaces the latter. `out` is overwritten. It goes there and back profile by profile: what a large map's pass
+    /// reads comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
     pub fn apply_and_back<N: Number>(
         &self,
         x: &[N],

@@ -211,8 +211,8 @@ impl Imager {
         self.zero_points[z].mean_kms -= kms;
     }
 
-    /// The velocities that are integrated out beside those of profiles: RV offsets of data sets, and then the drift; for
-    /// so many coordinates of an expansion, of which the velocities of all profiles come first.
+    /// The velocities that are integrated out beside those of profiles: RV offsets of data sets, and then the drift;
+    /// for so many coordinates of an expansion, of which the velocities of all profiles come first.
     pub fn common_velocities(&self, coordinates: usize) -> Vec<CommonVelocity> {
         let offset = |prior: &ZeroPointPrior| {
             let mut of_each = DVector::zeros(coordinates);
