@@ -311,7 +311,7 @@ fn what_map_would_refuse_is_refused_with_the_reason() {
     config["star"]["vsini_kms"] = json!(25.0);
     desk.write("star.json", &config.to_string());
     let message = failure(&desk, &["map", "star.json", "--out", "map"]);
-    says(&message, &["no map (amplitude-at-bound)", "the width of the local line is the likely reason"]);
+    says(&message, &["no map (amplitude-at-bound)", "likely cause: the width of the local line"]);
 }
 
 /// What a command says that fails though its input makes sense.
