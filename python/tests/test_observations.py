@@ -48,7 +48,7 @@ def test_shapes_of_errors_and_velocities() -> None:
         ({"times_d": [0.0, 1.0, np.inf, 3.0, 4.0]}, "profile 2"),
         ({"velocities_kms": [np.nan] * 21}, "velocities_kms: must be finite"),
         ({"sigma": "small"}, "sigma: must be numbers"),
-        ({"times_d": [0.0], "intensity": INTENSITY[:1]}, "two at least"),
+        ({"times_d": [0.0], "intensity": INTENSITY[:1]}, "at least two"),
     ],
 )
 def test_what_makes_no_sense_is_told(change: dict[str, Any], words: str) -> None:
