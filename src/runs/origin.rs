@@ -14,6 +14,7 @@ use crate::surface::expansion::nuisances;
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -198,8 +199,15 @@ impl Origin {
     /// # Errors
     /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
     pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Density, OriginError> {
-        let (surface, mut imager) = (scene.surface().model(), scene.imager.clone());
-        self.measured.star.iter().for_each(|star| star.put_into(&mut imager));
+        let (scene, space) = match &self.measured.star {
+            Some(star) => {
+                let scene = scene.clone().with_star(star.clone());
+                let space = scene.space_of(space.free());
+                (Cow::Owned(scene), space)
+            }
+            None => (Cow::Borrowed(scene), space),
+        };
+        let (surface, imager) = (scene.surface().model(), scene.imager.clone());
         surface.rebuilt(imager, space, &self.reference, &scene.settings.values).map_err(|error| match error {
             RebuildError::Differs { what, then, now } => {
                 OriginError::Irreproducible { folder: folder.into(), what, then, now }

@@ -85,8 +85,8 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
     }
 
-    /// Sets one of the rings: its points, each of which stands for so large a part of the star, and coefficients of mu to
-    /// mu^4 in their weights.
+    /// Sets one of the rings: its points, each of which stands for so large a part of the star, and coefficients of mu
+    /// to mu^4 in their weights.
     pub fn set(&mut self, ring: usize, points: [Point; POINTS], limb: [f64; 4], area: f64) {
         for (p, point) in points.into_iter().enumerate() {
             self.angular_velocity[p][ring] = point.angular_velocity;

@@ -3,7 +3,7 @@
 
 use super::Linearised;
 use super::expansion::Nuisance;
-use super::imaging::{CommonVelocity, Drift, Imager};
+use super::imaging::{Drift, Imager};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::{Common, common_velocities};
@@ -73,10 +73,8 @@ impl Linearised {
             mean_kms: prior.mean - vsys_kms,
             sd_kms: prior.sd,
         });
-        let common = imager.common_velocities(n).into_iter();
-        let common = common.map(|CommonVelocity { of_each, mean_kms, sd_kms }| Common { of_each, mean_kms, sd_kms });
         let is_free = systemic.is_some();
-        let all: Vec<Common> = systemic.into_iter().chain(common).collect();
+        let all: Vec<Common> = systemic.into_iter().chain(imager.common_velocities(n)).collect();
         let (values, sigmas) = common_velocities(&self.held, &all, peak)?;
         // from where the expansion holds them
         let centres = is_free.then_some(vsys_kms).into_iter().chain(imager.zero_points.iter().map(|z| z.held_kms()));

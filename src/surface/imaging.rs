@@ -10,6 +10,7 @@ mod problem;
 mod profile;
 
 use crate::maxent::entropy::Entropy;
+use crate::planets::periodogram::offset::Common;
 use crate::star::observation::Observations;
 use crate::star::{
     Brightness, Nearby, OwnMap, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid,
@@ -100,17 +101,6 @@ impl Drift {
         let x = (time_d - self.mid_d) / self.half_span_d;
         [x, x * x - 1.0 / 3.0]
     }
-}
-
-/// A velocity that several profiles have in common, with a Gaussian prior.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CommonVelocity {
-    /// How much of it each coordinate of an expansion has.
-    pub of_each: DVector<f64>,
-    /// Mean of the prior (km/s).
-    pub mean_kms: f64,
-    /// Standard deviation of the prior (km/s).
-    pub sd_kms: f64,
 }
 
 impl Imager {
@@ -213,17 +203,17 @@ impl Imager {
 
     /// The velocities that are integrated out beside those of profiles: RV offsets of data sets, and then the drift;
     /// for so many coordinates of an expansion, of which the velocities of all profiles come first.
-    pub fn common_velocities(&self, coordinates: usize) -> Vec<CommonVelocity> {
+    pub fn common_velocities(&self, coordinates: usize) -> Vec<Common> {
         let offset = |prior: &ZeroPointPrior| {
             let mut of_each = DVector::zeros(coordinates);
             self.profiles_of(prior.set).for_each(|k| of_each[k] = 1.0);
-            CommonVelocity { of_each, mean_kms: prior.mean_kms, sd_kms: prior.sd_kms }
+            Common { of_each, mean_kms: prior.mean_kms, sd_kms: prior.sd_kms }
         };
-        let mut all: Vec<CommonVelocity> = self.zero_points.iter().map(offset).collect();
+        let mut all: Vec<Common> = self.zero_points.iter().map(offset).collect();
         for (drift, term) in self.drift.iter().flat_map(|drift| (0..drift.terms()).map(move |term| (drift, term))) {
             let mut of_each = DVector::zeros(coordinates);
             self.times_d().iter().enumerate().for_each(|(k, time_d)| of_each[k] = drift.at(*time_d)[term]);
-            all.push(CommonVelocity { of_each, mean_kms: 0.0, sd_kms: DRIFT_KMS });
+            all.push(Common { of_each, mean_kms: 0.0, sd_kms: DRIFT_KMS });
         }
         all
     }

@@ -30,6 +30,7 @@ mod periodogram;
 mod plan;
 mod plot;
 mod profile_files;
+mod regions;
 mod report;
 mod sample;
 mod shared;

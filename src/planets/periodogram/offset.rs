@@ -39,7 +39,7 @@ pub fn offset(quadratic: &VelocityQuadratic, frequencies: &[f64], best: f64) -> 
 /// A velocity that several profiles have in common, with a Gaussian prior (km/s).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Common {
-    /// How much of it each profile has: 1 or 0.
+    /// How much of it each coordinate has, the velocities of profiles first: 1 or 0, or a polynomial in time.
     pub of_each: DVector<f64>,
     /// Mean of the prior (km/s).
     pub mean_kms: f64,

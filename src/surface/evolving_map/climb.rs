@@ -17,8 +17,8 @@ const STEPS: usize = 25;
 const STEP: f64 = 0.1;
 
 /// Second derivatives of minus ln Z that are larger than this say something; otherwise errors of 10 % are usual.
-const LEAST_BEND: f64 = 10.0;
-const USUAL_BEND: f64 = 100.0;
+pub(super) const LEAST_BEND: f64 = 10.0;
+pub(super) const USUAL_BEND: f64 = 100.0;
 
 /// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the step before.
 const LONGEST: f64 = 0.35;
@@ -32,7 +32,7 @@ pub(super) fn place(Assumed { field, jitter_kms }: &Assumed) -> Vector4<f64> {
     Vector4::new(field.spectrum.amplitude.ln(), field.spectrum.slope, lifetime_d.ln(), jitter_kms.ln())
 }
 
-fn assumed_at(place: Vector4<f64>, like: &Assumed) -> Assumed {
+pub(super) fn assumed_at(place: Vector4<f64>, like: &Assumed) -> Assumed {
     let lifetime = match like.field.kernel.lifetime {
         Lifetime::Static => Lifetime::Static,
         Lifetime::Days(_) => Lifetime::Days(place[2].exp()),

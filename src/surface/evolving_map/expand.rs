@@ -3,9 +3,10 @@
 use super::{Basis, Design, Marginal};
 use crate::field::{FieldError, Quadratic};
 use crate::model::{Parameter, ParameterValues};
+use crate::planets::periodogram::offset::Common;
 use crate::star::Response;
 use crate::surface::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
-use crate::surface::imaging::{CommonVelocity, Imager};
+use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -74,8 +75,7 @@ impl Marginal {
         }
         let common = imager.common_velocities(quadratic.gradient.len());
         let columns = DMatrix::from_columns(&common.iter().map(|one| one.of_each.clone()).collect::<Vec<_>>());
-        let of_each =
-            |number: fn(&CommonVelocity) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
+        let of_each = |number: fn(&Common) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
         let (mean, sd) = (of_each(|one| one.mean_kms), of_each(|one| one.sd_kms));
         let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
         Ok(self.expanded(imager, stellar, quadratic))

@@ -5,13 +5,13 @@
 //! derivatives are those of the linearised model, improved from step to step. Harmonics up to a low degree do: they say
 //! the same of lines.
 
-use super::climb::{limits as limits_of_field, place as place_of_field};
+use super::climb::{LEAST_BEND, USUAL_BEND, assumed_at, limits as limits_of_field, place as place_of_field};
 use super::fit::fit_anyhow;
-use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
-use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
+use super::{Basis, Design, Fitted, Known, Marginal, NoFit};
+use crate::field::FieldError;
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector4};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -38,15 +38,9 @@ const LEAST_AREA: f64 = 0.02;
 /// Longest step in a coordinate.
 const LONGEST: f64 = 1.0;
 
-/// Least second derivatives of the field.
-const LEAST_BEND: f64 = 10.0;
-
 /// Damping of the first step, and where no step leads up.
 const DAMPING: f64 = 0.05;
 const MOST_DAMPING: f64 = 1e3;
-
-/// Second derivatives of the field that are not told otherwise, as for errors of 10 %.
-const USUAL_BEND: f64 = 100.0;
 
 /// A number that is fitted: its Gaussian prior, where a climb begins, and its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -180,7 +174,7 @@ impl Climb<'_> {
         let mut values = near.values;
         let numbers = self.numbers(place, &values);
         self.priors.iter().zip(&numbers).for_each(|(prior, x)| values.set(prior.parameter, *x));
-        let assumed = self.assumed(place, &near.assumed);
+        let assumed = assumed_at(Vector4::from_fn(|i, _| place[i]), &near.assumed);
         let same_star = self.priors.iter().all(|prior| near.values.get(prior.parameter) == values.get(prior.parameter));
         let design = match same_star && like.is_some() {
             true => Arc::clone(&near.design),
@@ -196,18 +190,6 @@ impl Climb<'_> {
             true => Ok(Point { place: place.clone(), marginal, height }),
             false => Err(FieldError::NotPositive),
         }
-    }
-
-    fn assumed(&self, place: &DVector<f64>, like: &Assumed) -> Assumed {
-        let lifetime = match like.field.kernel.lifetime {
-            Lifetime::Static => Lifetime::Static,
-            Lifetime::Days(_) => Lifetime::Days(place[2].exp()),
-        };
-        let field = Field {
-            spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1], ..like.field.spectrum },
-            kernel: Kernel { lifetime, ..like.field.kernel },
-        };
-        Assumed { field, jitter_kms: if like.jitter_kms == 0.0 { 0.0 } else { place[3].exp() } }
     }
 
     fn ln_prior(&self, numbers: &[f64]) -> f64 {

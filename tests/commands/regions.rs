@@ -1,0 +1,115 @@
+//! What of the star itself is fitted before maps and searches: active regions, line and vsini; and drifts.
+
+use super::desk::{Desk, says, two_spots};
+use serde_json::{Value, json};
+
+const CONFIG: &str = "config.json";
+
+/// A star with spots whose regions have a line of their own, or the photosphere's; to be simulated into `data`.
+fn star(regions: &Value) -> Value {
+    let mut config = two_spots(json!({ "ensembles": 2, "walkers": 10, "steps": 2, "seed": 3, "ess": 1e6 }));
+    config["star"]["regions"] = regions.clone();
+    config["star"]["vsini_kms"] = json!(25.0);
+    let simulate = &mut config["observations"]["simulate"];
+    simulate["cycles"] = (0..24).map(|k| 0.083 * f64::from(k)).collect();
+    simulate["velocity_kms"] = json!({ "min": -42.0, "max": 42.0, "step": 2.0 });
+    config["planet"]["k_kms"] = json!(0.0);
+    config["imaging"] = json!({ "pixels": 400, "objective": "marginal-likelihood" });
+    config
+}
+
+/// Simulates it, and leaves its regions to the profiles.
+fn observed(regions: &Value) -> (Desk, Value) {
+    let mut config = star(regions);
+    let desk = Desk::new(config.clone());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    config["observations"] = json!({ "path": "data/observations.txt", "velocity_jitter_kms": 0.0 });
+    config["star"].as_object_mut().unwrap().remove("regions");
+    (desk, config)
+}
+
+#[test]
+fn regions_are_found_where_they_are_and_nowhere_else() {
+    let regions = json!({ "line_width": 1.5, "equivalent_width": 1.1, "shift_kms": 0.5, "area": 2.0,
+                          "area_limb": 0.0, "dimming_limb": -0.4 });
+    let plain = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
+    let [found, none] = [&regions, &plain].map(|regions| {
+        let (desk, config) = observed(regions);
+        desk.write(CONFIG, &config.to_string());
+        let said = desk.succeed(&["map", CONFIG, "--out", "map"]);
+        says(&said, &["active regions"]);
+        desk.json("map/fit.json")["measured"]["star"].clone()
+    });
+    assert_eq!(none["numbers"], json!([]), "{none}");
+    assert!(found["gain"].as_f64().unwrap() > 50.0, "{found}");
+    for number in found["numbers"].as_array().unwrap() {
+        let name = number["name"].as_str().unwrap();
+        let truth = regions[name.trim_start_matches("region_")].as_f64().unwrap();
+        let [value, sigma] = ["value", "sigma"].map(|key| number[key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * sigma, "{name}: {value} +- {sigma}, not {truth}");
+    }
+}
+
+/// The line and vsini that a config has wrong are put right, and a chain goes on with them as if it had not stopped.
+#[test]
+fn a_star_that_is_fitted_is_that_of_a_chain_that_goes_on() {
+    let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
+    config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
+    config["star"]["vsini_kms"] = json!(25.6);
+    config["star"]["fitted"] = json!(["line_sigma_kms", "vsini_kms"]);
+    config["parameters"] = json!({ "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
+                                   "phi": { "prior": "periodic" } });
+    desk.write(CONFIG, &config.to_string());
+    desk.succeed(&["sample", CONFIG, "--out", "whole"]);
+    let star = desk.json("whole/manifest.json")["measured"]["star"].clone();
+    let vsini = star["numbers"].as_array().unwrap().iter().find(|number| number["name"] == "vsini_kms").unwrap();
+    let [value, sigma] = ["value", "sigma"].map(|key| vsini[key].as_f64().unwrap());
+    assert!((value - 25.0).abs() < 4.0 * sigma && sigma < 0.3, "{star}");
+    config["sampler"]["steps"] = json!(1);
+    desk.write(CONFIG, &config.to_string());
+    desk.succeed(&["sample", CONFIG, "--out", "run"]);
+    config["sampler"]["steps"] = json!(2);
+    desk.write(CONFIG, &config.to_string());
+    desk.succeed(&["sample", CONFIG, "--out", "run", "--resume"]);
+    assert_eq!(desk.read("run/chain.jsonl"), desk.read("whole/chain.jsonl"));
+}
+
+#[test]
+fn keys_that_make_no_sense_are_refused() {
+    let sampled = || two_spots(json!({ "ensembles": 2, "walkers": 10, "steps": 2, "seed": 3, "ess": 1e6 }));
+    let refused = |key: &str, value: Value, objective: &str, expected: &[&str]| {
+        let mut config = sampled();
+        config["star"][key] = value;
+        config["imaging"] = json!({ "pixels": 200, "objective": objective });
+        says(&Desk::new(config).refusal(&["map", CONFIG, "--out", "map"]), expected);
+    };
+    let evolving = "marginal-likelihood";
+    refused("regions", json!({ "line_width": 3 }), evolving, &["star.regions.line_width: 3 must be from 0.5 to 2"]);
+    refused("fitted", json!(["period"]), evolving, &["star.fitted: \"period\" is none of \"line_sigma_kms\""]);
+    refused("fitted", json!(["vsini_kms", "vsini_kms"]), evolving, &["star.fitted: \"vsini_kms\" is there twice"]);
+    refused("velocity_drift", json!("linear"), "spottedness", &["star.velocity_drift: no effect but with"]);
+}
+
+/// A drift is told with its error, and is no planet at the edge of the search.
+#[test]
+fn a_drift_is_told_with_its_error() {
+    let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
+    config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
+    config["star"]["velocity_drift"] = json!("linear");
+    config["parameters"]["vsys_kms"] = json!({ "prior": "uniform", "min": -1, "max": 1 });
+    desk.write(CONFIG, &config.to_string());
+    // 20 m/s a day, as the list of profiles subtracts it
+    let list = desk.read("data/observations.txt");
+    let drifted = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+        [file, time] if !line.starts_with('#') => {
+            format!("{file} {time} {:.6}\n", -0.02 * time.parse::<f64>().unwrap())
+        }
+        _ => format!("{line}\n"),
+    };
+    desk.write("data/observations.txt", &list.lines().map(drifted).collect::<String>());
+    let said = desk.succeed(&["periodogram", CONFIG, "--out", "search", "--draws", "1000"]);
+    says(&said, &["No significant signal", "RV drift: ", "m/s/d (", "a long-period companion or instrumental drift"]);
+    let drift = desk.json("search/periodogram.json")["drift"].clone();
+    let [slope, sigma] = ["kms_d", "sigma_kms_d"].map(|key| drift[key].as_f64().unwrap());
+    assert!((slope - 0.02).abs() < 3.0 * sigma && sigma < 0.005, "{drift}");
+}
