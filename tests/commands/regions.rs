@@ -96,6 +96,7 @@ fn a_drift_is_told_with_its_error() {
     let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
     config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
     config["star"]["velocity_drift"] = json!("linear");
+    config["sampler"]["walkers"] = json!(12);
     config["parameters"]["vsys_kms"] = json!({ "prior": "uniform", "min": -1, "max": 1 });
     desk.write(CONFIG, &config.to_string());
     // 20 m/s a day, as the list of profiles subtracts it
