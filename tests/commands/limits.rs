@@ -52,7 +52,7 @@ fn column(table: &str, name: &str) -> Vec<f64> {
 fn both_ways_and_the_closed_form_agree() {
     let desk = desk(0.0);
     let table = limits(&desk, &["--full", "10", "--out", "a"]);
-    says(&table, &["K 50 %", "K 95 %", "false alarms below 1 %", "the whole way:", "a: limits.csv, limits.json"]);
+    says(&table, &["K 50 %", "K 95 %", "FAP < 1 %", "full pipeline:", "a: limits.csv, limits.json"]);
     let file = desk.json("a/limits.json");
     // ten orbits within a factor of 2 of the limit, where the shortcut's second order and the noise of resampling
     // decide

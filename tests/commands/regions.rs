@@ -37,7 +37,7 @@ fn regions_are_found_where_they_are_and_nowhere_else() {
         let (desk, config) = observed(regions);
         desk.write(CONFIG, &config.to_string());
         let said = desk.succeed(&["map", CONFIG, "--out", "map"]);
-        says(&said, &["active regions"]);
+        says(&said, &["fitted star"]);
         desk.json("map/fit.json")["measured"]["star"].clone()
     });
     assert_eq!(none["numbers"], json!([]), "{none}");

@@ -132,7 +132,7 @@ impl Measured {
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("RV jitter", jitter.line()));
-        let star = self.star.as_ref().map(|star| ("active regions", star.line()));
+        let star = self.star.as_ref().map(|star| ("fitted star", star.line()));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
             let Season { first_d, last_d, profiles, .. } = season;

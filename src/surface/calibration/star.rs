@@ -130,17 +130,22 @@ impl MeasuredStar {
     pub fn line(&self) -> String {
         let MeasuredStar { numbers, mean_profile, gain } = self;
         if numbers.is_empty() {
-            return format!("as the photosphere, dimmed (a line of their own gains {gain:.1} in ln Z)");
+            return match *gain < NEEDED {
+                true => format!("regions as the photosphere, dimmed (Δln Z of their own line = {gain:.1})"),
+                false => format!(
+                    "regions as the photosphere, dimmed; others, far from solar, gain Δln Z = {gain:.0}: see star.fitted"
+                ),
+            };
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
-            let name = name.trim_start_matches("region_").trim_end_matches("_kms").replace('_', " ");
-            format!("{name} {value:.2} +- {sigma:.2}")
+            let name = name.trim_end_matches("_kms").replace('_', " ");
+            format!("{name} {value:.2} ± {sigma:.2}")
         };
         let all: Vec<String> = numbers.iter().map(of).collect();
         let mean = match mean_profile {
             0.0 => String::new(),
             size => format!(", mean profile {:.2} %", 100.0 * size),
         };
-        format!("{}{mean} (gain {gain:.0} in ln Z)", all.join(", "))
+        format!("{}{mean} (Δln Z = {gain:.0})", all.join(", "))
     }
 }
