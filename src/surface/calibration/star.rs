@@ -133,7 +133,7 @@ impl MeasuredStar {
             return match *gain < NEEDED {
                 true => format!("regions as the photosphere, dimmed (Δln Z of their own line = {gain:.1})"),
                 false => format!(
-                    "regions as the photosphere, dimmed; others, far from solar, gain Δln Z = {gain:.0}: see star.fitted"
+                    "regions as the photosphere, dimmed; far from solar ones gain Δln Z = {gain:.0}: see star.fitted"
                 ),
             };
         }
