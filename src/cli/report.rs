@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// the same `star.name`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report demo_map runs/demo_periodogram runs/demo --out demo.html"
+    after_help = "Example:\n  dimcmc report runs/demo\n  \
+                  dimcmc report demo_map runs/demo_periodogram runs/demo --out p.html"
 )]
 pub struct Args {
     /// Folders that other commands wrote
