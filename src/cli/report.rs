@@ -13,10 +13,8 @@ use std::path::{Path, PathBuf};
 /// others. Its heading is `star.name` of the config. All folders must be of one star: of the same observations, or with
 /// the same `star.name`.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Example:\n  dimcmc report runs/demo\n  \
-                  dimcmc report demo_map runs/demo_periodogram runs/demo --out p.html"
-)]
+#[command(after_help = "Example:\n  dimcmc report runs/demo\n  \
+                  dimcmc report demo_map runs/demo_periodogram runs/demo --out p.html")]
 pub struct Args {
     /// Folders that other commands wrote
     #[arg(required = true, value_name = "FOLDER")]
