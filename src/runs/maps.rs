@@ -62,7 +62,9 @@ impl<'a> Maps<'a> {
         let found = scene.maps(times_d);
         let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();
         let suspicious = match &found {
-            Ok(SurfaceMaps { field: Some(field), .. }) => field.at_bounds.iter().any(is_bound),
+            Ok(SurfaceMaps { field: Some(field), .. }) => {
+                field.at_bounds.iter().any(is_bound) || field.stands_in().is_some()
+            }
             Ok(_) => scene.measured.misfit_text().is_some(),
             Err(error) => !matches!(error, NoMaps::Times(_)),
         };

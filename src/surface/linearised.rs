@@ -1,12 +1,13 @@
 //! What every surface model gives at one place of parameter space, and why it may not.
 
-use super::evolving_map::NoFit;
+use super::evolving_map::{LARGEST_AMPLITUDE, NoFit};
 use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::Remark;
 use crate::star::observation::RadialVelocity;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
@@ -105,6 +106,36 @@ impl SpotField {
                 (observations.sigma_scale: \"auto\"); a variable continuum or line (imaging.nuisances)"
             )
         })
+    }
+
+    /// That spots stand in for something else, where there are more than a star can have, and what that may be.
+    pub fn stands_in(&self) -> Option<Remark> {
+        let amplitude = self.spot_amplitude;
+        (amplitude > LARGEST_AMPLITUDE).then(|| {
+            let text = format!(
+                "spot_amplitude is {amplitude:.2}, more than a star can have: spots stand in for something else. Likely \
+                causes: star.line, star.vsini_kms, star.vsys_kms (let star.fitted name them), or observations.sigma_scale"
+            );
+            Remark::against("more spots than a star can have", text)
+        })
+    }
+
+    /// What has to be known of it: bounds that it reached, and more spots than a star can have.
+    pub fn remarks(&self) -> Vec<Remark> {
+        let reached = |name: &String| {
+            let is_of = |parameter: Parameter| *name == parameter.name();
+            let absorbs = || self.absorbs().filter(|_| is_of(Parameter::SpotLifetime));
+            let faint = || {
+                let amplitude = self.spot_amplitude;
+                (is_of(Parameter::SpotAmplitude) && amplitude < Parameter::SpotAmplitude.usual()).then(|| {
+                    format!("The profiles show no spots: spot_amplitude is at its lower search bound, {amplitude:.2}.")
+                })
+            };
+            Remark::note(faint().or_else(absorbs).unwrap_or_else(|| {
+                format!("{name} is at its search bound: unconstrained by the data, or the model is misspecified.")
+            }))
+        };
+        self.at_bounds.iter().map(reached).chain(self.stands_in()).collect()
     }
 
     /// It in a line.

@@ -18,7 +18,7 @@ pub use draft::{Draft, Sought};
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use settings::{
-    DataSetSettings, GridSettings, LightCurveSettings, LightSource, MOST_NODES, ObservationSource, Settings,
+    DataSetSettings, FITTED, GridSettings, LightCurveSettings, LightSource, MOST_NODES, ObservationSource, Settings,
 };
 pub use written::{
     Automatic, EquivalentWidth, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line,

@@ -14,6 +14,7 @@ use crate::inference::search::SearchError;
 use crate::model::Parameter;
 use crate::star::BrightnessModel;
 use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::{NoMaps, ReferenceError, SurfaceMaps};
 use std::path::Path;
 use std::sync::Arc;
@@ -54,6 +55,8 @@ pub(super) struct Trial {
     pub orbit: bool,
     /// Whether the measured vsini stands in place of the given one, with which nothing fits.
     pub measured_vsini: bool,
+    /// What was fitted of the star, and what it gains.
+    pub star: Option<String>,
     /// What has to be known of the maps.
     pub warnings: Vec<String>,
 }
@@ -125,7 +128,7 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
     let tried = |draft: &Draft| -> Result<(Scene, Result<SurfaceMaps, NoMaps>), ProposalError> {
         let mut coarse = draft.clone();
         coarse.imaging.pixels = coarse.imaging.pixels.min(PIXELS);
-        let scene = scene(&coarse, place.config, &few)?;
+        let scene = scene(&coarse, place.config, &few)?.fitted(&|_| ());
         let first_d = scene.observations.profiles.first().map(|profile| profile.time_d);
         let maps = scene.maps(Some(first_d.as_slice()));
         Ok((scene, maps))
@@ -151,9 +154,11 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
     let field = maps.field.as_ref();
     let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();
     let poor = maps.summary.chi2_per_datum > POOR;
-    if poor || field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
+    let stands_in = field.is_some_and(|field| field.stands_in().is_some());
+    if poor || stands_in || field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
         trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| poor || diagnosis.reason != Reason::Errors);
     }
+    trial.star = scene.measured.star.as_ref().map(MeasuredStar::line);
     trial.warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().collect();
     let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());
     let of = if used < all { format!("{used} of the {all}") } else { format!("the {all}") };
@@ -338,7 +343,15 @@ fn spotted(spottedness: f64, draft: &Draft, orbit: bool) -> String {
 
 impl Trial {
     fn of(end: End) -> Self {
-        Trial { end, errors: Vec::new(), diagnosis: None, orbit: false, measured_vsini: false, warnings: Vec::new() }
+        Trial {
+            end,
+            errors: Vec::new(),
+            diagnosis: None,
+            orbit: false,
+            measured_vsini: false,
+            star: None,
+            warnings: Vec::new(),
+        }
     }
 
     /// Whether a map can be made of the config as it is.
@@ -365,6 +378,7 @@ impl Trial {
                 format!("test fit: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
             }
         };
-        vsini.into_iter().chain([ending]).chain(self.warnings.iter().cloned()).collect()
+        let star = self.star.as_ref().map(|star| format!("fitted star: {star}"));
+        vsini.into_iter().chain([ending]).chain(star).chain(self.warnings.iter().cloned()).collect()
     }
 }

@@ -5,9 +5,10 @@ use super::known::{Given, Known};
 use super::ledger::{Ledger, Source, origin};
 use super::line;
 use crate::data::config::{
-    Automatic, Draft, EquivalentWidth, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape,
-    ObservationsSection, PhotometrySection, Sought, Star, VelocityJitter,
+    Automatic, Draft, EquivalentWidth, FITTED, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line,
+    LineShape, ObservationsSection, PhotometrySection, Sought, Star, VelocityJitter,
 };
+use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::observation::Observations;
@@ -186,7 +187,7 @@ impl Values {
                 gamma_kms,
                 equivalent_width_kms: equivalent_width(cuts, known, ledger),
             },
-            fitted: Vec::new(),
+            fitted: fitted(cuts.len(), known, ledger),
             velocity_drift: None,
             regions: None,
         };
@@ -397,6 +398,20 @@ fn weighted_mean(values: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
         (sum + weight * x, weights + weight)
     });
     (sum / weights, weights.sqrt().recip())
+}
+
+/// Numbers of the star that every command fits under priors around the values here; none with static maps. Of several
+/// data sets each has an equivalent width and a limb darkening of its own.
+fn fitted(data_sets: usize, known: &Known, ledger: &mut Ledger) -> Vec<String> {
+    if !known.objective().properties().has_field {
+        return Vec::new();
+    }
+    let common = |parameter: &&Parameter| matches!(parameter, Parameter::LineSigma | Parameter::Vsini);
+    let names = FITTED.iter().filter(|parameter| data_sets == 1 || common(parameter));
+    let names: Vec<String> = names.map(|parameter| parameter.name().to_owned()).collect();
+    let remark = "fitted by every command, under priors around the values above and below";
+    ledger.note("star.fitted", format!("{} numbers", names.len()), "", Source::Assumed, remark);
+    names
 }
 
 fn equivalent_width(cuts: &[&Observations], known: &Known, ledger: &mut Ledger) -> EquivalentWidth {

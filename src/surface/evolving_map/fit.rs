@@ -2,7 +2,7 @@
 //! jitter.
 
 use super::climb::{GAIN, Top, climb, limits, place};
-use super::known::{BOUNDS, Known, USUAL};
+use super::known::{Known, USUAL};
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::model::{Parameter, ParameterValues};
@@ -13,9 +13,6 @@ use std::sync::Arc;
 
 /// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
 const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
-
-/// An amplitude of so much of its upper bound grows to it.
-const NEARLY: f64 = 0.95;
 
 /// From so much lower in ln Z no climb makes good.
 const FAR_BELOW: f64 = 5.0;
@@ -45,12 +42,6 @@ pub enum NoFit {
     /// The field cannot be integrated over.
     #[error(transparent)]
     Field(#[from] FieldError),
-    /// No spots are like that.
-    #[error(
-        "the amplitude of the spots grows to the upper bound of its search, {0:.2}: spots stand in for something else; \
-        star.vsini_kms, star.line, star.vsys_kms or observations.sigma_scale may be wrong"
-    )]
-    TooLarge(f64),
     /// The density of the data is no number.
     #[error("the evidence of the most probable field is not finite; data or errors are beyond sense")]
     NotFinite,
@@ -64,7 +55,6 @@ impl NoFit {
             NoFit::Field(FieldError::NotFinite { .. }) | NoFit::NotFinite => "non-finite",
             NoFit::Field(FieldError::NotPositive) => "not-positive",
             NoFit::Field(FieldError::NotSettled { .. }) => "not-settled",
-            NoFit::TooLarge(_) => "amplitude-at-bound",
         }
     }
 }
@@ -79,16 +69,6 @@ impl Fitted {
     pub fn too_faint(&self) -> Option<f64> {
         let amplitude = self.marginal.assumed.field.spectrum.amplitude;
         (self.at_bounds.contains(&Parameter::SpotAmplitude.name()) && amplitude < USUAL[0]).then_some(amplitude)
-    }
-
-    /// That spots are like that.
-    fn checked(self, known: &Known) -> Result<Self, NoFit> {
-        let amplitude = self.marginal.assumed.field.spectrum.amplitude;
-        match known.amplitude {
-            None if amplitude > NEARLY * BOUNDS[0].1 => Err(NoFit::TooLarge(amplitude)),
-            _ if !self.ln_evidence.is_finite() => Err(NoFit::NotFinite),
-            _ => Ok(self),
-        }
     }
 }
 
@@ -114,16 +94,6 @@ pub(in crate::surface) fn usual(
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
 pub fn fit(
-    imager: &Imager,
-    basis: &Basis,
-    values: ParameterValues,
-    known: Known,
-    near: Option<&Fitted>,
-) -> Result<Fitted, NoFit> {
-    unchecked(imager, basis, values, known, near)?.checked(&known)
-}
-
-fn unchecked(
     imager: &Imager,
     basis: &Basis,
     values: ParameterValues,
@@ -169,21 +139,11 @@ fn unchecked(
     }
     let Top { marginal, hessian } = top;
     let ln_evidence = marginal.ln_evidence();
+    if !ln_evidence.is_finite() {
+        return Err(NoFit::NotFinite);
+    }
     let at_bounds = reached(&marginal.assumed, &known);
     Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) })
-}
-
-/// The same, wherever the amplitude ends: spots may stand in for what is still to be found of the star.
-///
-/// # Errors
-/// As [`fit`].
-pub(super) fn fit_anyhow(
-    imager: &Imager,
-    basis: &Basis,
-    values: ParameterValues,
-    known: Known,
-) -> Result<Fitted, NoFit> {
-    unchecked(imager, basis, values, known, None)
 }
 
 /// The field of a share of the profiles: nearly that of all of them, at a small part of the work; with its Hessian.

@@ -13,6 +13,10 @@ pub(super) const BOUNDS: [(f64, f64); 3] =
 pub(super) const USUAL: [f64; 3] =
     [Parameter::FIELD[0].usual(), Parameter::FIELD[1].usual(), Parameter::FIELD[2].usual()];
 
+/// An amplitude has a half-normal prior of this standard deviation, unless a config gives another one: no star is
+/// covered so much, and spots that seem to be stand in for something else.
+pub const LARGEST_AMPLITUDE: f64 = 1.0;
+
 /// Degree below which the spectrum of spots is flat: those of 10 to 25 deg, here and there.
 const BREAK_DEGREE: f64 = 7.0;
 
@@ -31,7 +35,7 @@ pub struct Known {
     /// Velocity jitter (km/s).
     pub jitter_kms: Option<f64>,
     /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
-    /// in ln amplitude, slope and ln lifetime.
+    /// in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
 }
 
@@ -85,7 +89,11 @@ impl Known {
             let (prior, x) = (self.priors[i]?, numbers[i]?);
             self.free(assumed)[i].then(|| prior.log_density(x) + Parameter::FIELD[i].log_jacobian(x))
         };
-        (0..3).filter_map(of).sum()
+        let usual = match self.priors[0] {
+            None if self.amplitude.is_none() => -0.5 * (spectrum.amplitude / LARGEST_AMPLITUDE).powi(2),
+            _ => 0.0,
+        };
+        (0..3).filter_map(of).sum::<f64>() + usual
     }
 
     /// What is maximised: ln Z, and what is known of the field beforehand.

@@ -40,7 +40,7 @@ pub use change::Change;
 pub use design::Design;
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
-pub use known::Known;
+pub use known::{Known, LARGEST_AMPLITUDE};
 pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use planned::Planned;

@@ -5,7 +5,6 @@ use super::light::misfits;
 use super::linearised::linearised;
 use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, OtherRotation, fit};
 use crate::field::{Field, Kernel, Lifetime};
-use crate::model::Parameter;
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::sampling::log_density::Status;
@@ -60,7 +59,7 @@ impl SurfaceMaps {
             pixels: maps.filling.column(k).iter().copied().collect(),
             sigma: Some(maps.sd.column(k).iter().copied().collect()),
         };
-        let mut warnings = reached(fitted);
+        let mut warnings: Vec<String> = SpotField::of(fitted).remarks().into_iter().map(|remark| remark.text).collect();
         warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
         let against = Against::new(imager, observations, marginal.values, &modelled.depths());
         let velocities = velocities(&here.held, &against);
@@ -117,16 +116,6 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
     let mut misfit = Checks::of_flexible(&against.residuals, &sets, imager.data.correlated_bins).warnings;
     misfit.extend(misfits(imager, &marginal.light_curves(imager)));
     Explained { chi2_per_datum: against.chi2() / observations.len() as f64, misfit, velocities: against.moments }
-}
-
-/// What is to be said of bounds that the field reached.
-fn reached(fitted: &Fitted) -> Vec<String> {
-    let absorbs = SpotField::of(fitted).absorbs();
-    let said = |name: &&str| match &absorbs {
-        Some(absorbs) if *name == Parameter::SpotLifetime.name() => absorbs.clone(),
-        _ => format!("{name} is at its search bound: unconstrained by the data, or the model is misspecified."),
-    };
-    fitted.at_bounds.iter().map(said).collect()
 }
 
 /// What is to be said of times of which the profiles tell little: those where the spots have less than this

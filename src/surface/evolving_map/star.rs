@@ -6,8 +6,8 @@
 //! the same of lines.
 
 use super::climb::{LEAST_BEND, USUAL_BEND, assumed_at, limits as limits_of_field, place as place_of_field};
-use super::fit::fit_anyhow;
-use super::{Basis, Design, Fitted, Known, Marginal, NoFit};
+use super::fit::fit;
+use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::field::FieldError;
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
@@ -34,6 +34,9 @@ const MEAN_PROFILE_SD: f64 = 5e-3;
 
 /// Least surface of active regions per filling factor of spots that a climb goes down to.
 const LEAST_AREA: f64 = 0.02;
+
+/// A climb with more profiles than this starts from that with a share of them.
+const FEW: usize = 24;
 
 /// Longest step in a coordinate.
 const LONGEST: f64 = 1.0;
@@ -79,7 +82,17 @@ struct Point {
     height: f64,
 }
 
+/// Where a climb ends.
+struct Top {
+    point: Point,
+    /// Minus the second derivatives.
+    bend: DMatrix<f64>,
+    /// Those along each number of the field.
+    of_field: [f64; OF_FIELD],
+}
+
 /// The way up.
+#[derive(Clone)]
 struct Climb<'a> {
     imager: &'a Imager,
     basis: Basis,
@@ -94,38 +107,50 @@ struct Climb<'a> {
 /// # Errors
 /// [`NoFit`].
 pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
-    fit_anyhow(imager, &Basis::coarse(&imager.grid, DEGREE), values, known)
+    fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
 }
 
-/// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`.
+/// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
+/// first those of the line, if there are any, then all with a share of the profiles, then with all of them.
 ///
 /// # Errors
 /// [`FieldError`].
 pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPrior]) -> Result<FittedStar, FieldError> {
     let assumed = near.marginal.assumed;
-    let area = |prior: &&StarPrior| prior.parameter == Parameter::RegionArea;
-    let area =
-        priors.iter().find(area).map_or(near.marginal.values.get(Parameter::RegionArea), |prior| Some(prior.start));
-    let area = area.unwrap_or(1.0);
-    let ends = |prior: &StarPrior| match prior.parameter {
-        Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
-        _ => (f64::NEG_INFINITY, f64::INFINITY),
-    };
-    let size = (MEAN_PROFILES.0.ln(), MEAN_PROFILES.1.ln());
-    let limits = limits_of_field(known).into_iter().chain([size]).chain(priors.iter().map(ends)).collect();
-    let basis = Basis::coarse(&imager.grid, DEGREE);
-    // who trusts the line trusts the mean profile
-    let line_is_fitted = priors.iter().any(|prior| !Parameter::REGIONS.contains(&prior.parameter));
-    let size_at_first = if line_is_fitted { MEAN_PROFILE } else { 0.0 };
-    let free = known.free(&assumed).into_iter().chain([line_is_fitted]).collect();
-    let climb = Climb { imager, basis, known, priors, free, limits };
-    let of_star = priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
-    let place = DVector::from_iterator(
-        OF_FIELD + priors.len(),
-        place_of_field(&assumed).into_iter().copied().chain([size_at_first.ln()]).chain(of_star),
-    );
-    let first = climb.condensed_at(&place, &near.marginal, None)?;
-    climb.up(first)
+    let few = share_of(imager);
+    let climb = Climb::new(few.as_ref().unwrap_or(imager), known, &assumed, priors);
+    let of_line = climb.priors.iter().filter(|prior| prior.is_of_line()).count();
+    let mut start = near.marginal.clone();
+    if few.is_some() {
+        let values = start.values;
+        let design = Arc::new(Design::new(climb.imager, &climb.basis, &values.state()));
+        start = Marginal::new(climb.imager, &climb.basis, design, values, assumed, None)?;
+    }
+    let mut place = climb.start(&assumed, &start.values);
+    if of_line > 0 && of_line < priors.len() {
+        let line = Climb::new(climb.imager, known, &assumed, &priors[..of_line]);
+        let from = place.rows(0, OF_FIELD + of_line).into_owned();
+        let top = line.up(line.condensed_at(&from, &start, None)?, None)?;
+        place.rows_mut(0, OF_FIELD + of_line).copy_from(&top.point.place);
+        start = top.point.marginal;
+    }
+    let top = climb.up(climb.condensed_at(&place, &start, None)?, None)?;
+    if few.is_none() {
+        return Ok(climb.fitted(&top));
+    }
+    let more = imager.profiles().count() as f64 / climb.imager.profiles().count() as f64;
+    let of_field = top.of_field.map(|along| along * more);
+    let climb = Climb { imager, ..climb };
+    let top = climb.up(climb.condensed_at(&top.point.place, &near.marginal, None)?, Some(of_field))?;
+    Ok(climb.fitted(&top))
+}
+
+/// A share of many profiles, from which a climb starts: most of the way up takes a fraction of the work.
+fn share_of(imager: &Imager) -> Option<Imager> {
+    let profiles = imager.profiles().count();
+    let every = profiles.div_ceil(FEW);
+    let others = || (0..profiles).filter(|k| k % every != 0).collect::<Vec<_>>();
+    (every > 1).then(|| imager.without(&others()))
 }
 
 /// The coordinate of a number of active regions in which the profiles are nearly linear: what their line changes goes
@@ -153,7 +178,49 @@ fn number(parameter: Parameter, coordinate: f64, area: f64) -> f64 {
     }
 }
 
-impl Climb<'_> {
+impl StarPrior {
+    fn is_of_line(&self) -> bool {
+        !Parameter::REGIONS.contains(&self.parameter)
+    }
+}
+
+impl<'a> Climb<'a> {
+    /// The way up for the numbers that have `priors`, those of the line first.
+    fn new(imager: &'a Imager, known: &'a Known, assumed: &Assumed, priors: &'a [StarPrior]) -> Self {
+        let ends = |prior: &StarPrior| match prior.parameter {
+            Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        let size = (MEAN_PROFILES.0.ln(), MEAN_PROFILES.1.ln());
+        let limits = limits_of_field(known).into_iter().chain([size]).chain(priors.iter().map(ends)).collect();
+        // who trusts the line trusts the mean profile
+        let free = known.free(assumed).into_iter().chain([priors.iter().any(StarPrior::is_of_line)]).collect();
+        Climb { imager, basis: Basis::coarse(&imager.grid, DEGREE), known, priors, free, limits }
+    }
+
+    /// Where it begins.
+    fn start(&self, assumed: &Assumed, values: &ParameterValues) -> DVector<f64> {
+        let area = self.priors.iter().find(|prior| prior.parameter == Parameter::RegionArea);
+        let area = area.map(|prior| prior.start).or(values.get(Parameter::RegionArea)).unwrap_or(1.0);
+        let of_star = self.priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
+        let size: f64 = if self.free[SIZE] { MEAN_PROFILE } else { 0.0 };
+        let of_field = place_of_field(assumed);
+        let all = of_field.iter().copied().chain([size.ln()]).chain(of_star);
+        DVector::from_iterator(OF_FIELD + self.priors.len(), all)
+    }
+
+    /// The place with coordinates of numbers within their bounds.
+    fn inside(&self, place: &DVector<f64>, values: &ParameterValues) -> DVector<f64> {
+        let mut inside = place.clone();
+        let numbers = self.numbers(place, values);
+        let area = self.priors.iter().position(|prior| prior.parameter == Parameter::RegionArea);
+        let area = area.map(|i| numbers[i]).or(values.get(Parameter::RegionArea)).unwrap_or(1.0);
+        for (i, (prior, x)) in self.priors.iter().zip(&numbers).enumerate() {
+            inside[OF_FIELD + i] = coordinate(prior.parameter, *x, area);
+        }
+        inside
+    }
+
     /// The star's numbers there.
     fn numbers(&self, place: &DVector<f64>, values: &ParameterValues) -> Vec<f64> {
         let of_star = || self.priors.iter().zip(place.iter().skip(OF_FIELD));
@@ -187,7 +254,7 @@ impl Climb<'_> {
         let of_size = -0.5 * (imager.mean_profile / MEAN_PROFILE_SD).powi(2);
         let height = self.known.height(&marginal) + self.ln_prior(&numbers) + of_size;
         match height.is_finite() {
-            true => Ok(Point { place: place.clone(), marginal, height }),
+            true => Ok(Point { place: self.inside(place, &values), marginal, height }),
             false => Err(FieldError::NotPositive),
         }
     }
@@ -237,7 +304,7 @@ impl Climb<'_> {
     }
 
     /// The same, with those along each number of the field.
-    fn with_field(&self, at: &Point, of_field: &[f64]) -> Result<DMatrix<f64>, FieldError> {
+    fn with_field(&self, at: &Point, of_field: &[f64; OF_FIELD]) -> Result<DMatrix<f64>, FieldError> {
         let mut bend = self.bend(at)?;
         of_field.iter().enumerate().for_each(|(i, along)| bend[(i, i)] = *along);
         Ok(bend)
@@ -278,11 +345,12 @@ impl Climb<'_> {
     }
 
     /// The way up, by Newton's steps, damped as those of Levenberg and Marquardt (Nocedal & Wright 2006, section 10.3).
-    fn up(&self, mut here: Point) -> Result<FittedStar, FieldError> {
+    /// Second derivatives along the numbers of the field are measured, unless they are known.
+    fn up(&self, mut here: Point, of_field: Option<[f64; OF_FIELD]>) -> Result<Top, FieldError> {
         let count = self.limits.len();
-        let mut bend = self.bend(&here)?;
-        let (mut gradient, along) = self.gradient(&here, &bend, true);
-        let of_field: Vec<f64> = (0..OF_FIELD).map(|i| along[i].max(LEAST_BEND)).collect();
+        let mut bend = self.with_field(&here, &of_field.unwrap_or([USUAL_BEND; OF_FIELD]))?;
+        let (mut gradient, along) = self.gradient(&here, &bend, of_field.is_none());
+        let of_field = of_field.unwrap_or(std::array::from_fn(|i| along[i].max(LEAST_BEND)));
         let mut damping = DAMPING;
         bend = self.with_field(&here, &of_field)?;
         let mut learnt = false;
@@ -292,7 +360,13 @@ impl Climb<'_> {
                 (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
                     || (here.place[i] >= high - 1e-9 && gradient[i] > 0.0)
             };
-            let moves: Vec<bool> = (0..count).map(|i| self.is_free(i) && !pushes(i)).collect();
+            let stuck = |i: usize| {
+                let mut there = here.place.clone();
+                there[i] += 1e-3 * gradient[i].signum();
+                let values = &here.marginal.values;
+                i >= OF_FIELD && self.numbers(&there, values) == self.numbers(&here.place, values)
+            };
+            let moves: Vec<bool> = (0..count).map(|i| self.is_free(i) && !pushes(i) && !stuck(i)).collect();
             let inside = DVector::from_fn(count, |i, _| if moves[i] { gradient[i] } else { 0.0 });
             let way = |damping: f64| {
                 let damped = DMatrix::from_fn(count, count, |i, j| match i == j {
@@ -338,12 +412,17 @@ impl Climb<'_> {
             }
             gradient = there;
         }
+        Ok(Top { point: here, bend, of_field })
+    }
+
+    /// The star at the end of a climb.
+    fn fitted(&self, Top { point: here, bend, .. }: &Top) -> FittedStar {
         let covariance = match bend.clone().cholesky() {
             Some(factor) => factor.inverse(),
             None => DMatrix::from_diagonal(&bend.diagonal().map(|bend| bend.max(1e-6).recip())),
         };
         let of_star = (OF_FIELD, self.priors.len());
-        let jacobian = self.jacobian(&here);
+        let jacobian = self.jacobian(here);
         let covariance =
             &jacobian * covariance.view((of_star.0, of_star.0), (of_star.1, of_star.1)) * jacobian.transpose();
         let sd = covariance.diagonal().map(f64::sqrt);
@@ -351,13 +430,13 @@ impl Climb<'_> {
         let ln_prior = self.ln_prior(&numbers);
         let sd = sd.iter().copied().collect();
         let mean_profile = Some(here.place[SIZE].exp()).filter(|size| *size > 1.5 * MEAN_PROFILES.0).unwrap_or(0.0);
-        Ok(FittedStar {
+        FittedStar {
             values: here.marginal.values,
             sd,
             mean_profile,
             ln_evidence: here.marginal.ln_evidence(),
             ln_prior,
-        })
+        }
     }
 
     /// The point at the end of a step, where it is higher.

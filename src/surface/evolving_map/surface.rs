@@ -3,7 +3,7 @@
 use super::linearised::linearised;
 use super::{Basis, Change, Fitted, Known, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
 use crate::field::Lifetime;
-use crate::model::{Parameter, ParameterSpace, ParameterValues};
+use crate::model::{ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
@@ -121,19 +121,7 @@ impl SurfaceModel for EvolvingMap {
 
     /// What has to be known of the field.
     fn remarks(&self, _: &Imager, here: &Linearised) -> Vec<Remark> {
-        let field: &Fitted = here.kept();
-        let (faint, absorbs) = (field.too_faint(), SpotField::of(field).absorbs());
-        let reached = |name: &&str| {
-            let is_of = |parameter: Parameter| *name == parameter.name();
-            Remark::note(match (faint, &absorbs) {
-                (Some(amplitude), _) if is_of(Parameter::SpotAmplitude) => {
-                    format!("The profiles show no spots: spot_amplitude is at its lower search bound, {amplitude:.2}.")
-                }
-                (_, Some(absorbs)) if is_of(Parameter::SpotLifetime) => absorbs.clone(),
-                _ => format!("{name} is at its search bound: unconstrained by the data, or the model is misspecified."),
-            })
-        };
-        field.at_bounds.iter().map(reached).collect()
+        SpotField::of(here.kept()).remarks()
     }
 
     fn maps(&self, at: At, observations: &Observations, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps> {

@@ -14,6 +14,7 @@ mod star;
 pub use grid::{GridSettings, MOST_NODES};
 pub use observations::{DataSetSettings, ObservationSource};
 pub use photometry::{LightCurveSettings, LightSource};
+pub use star::FITTED;
 
 use super::error::{ConfigError, Fault};
 use super::identity::fingerprint;

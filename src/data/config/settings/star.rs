@@ -82,16 +82,16 @@ fn fitted_regions(section: &RegionsSection) -> Vec<Parameter> {
     if none { Vec::new() } else { fitted.map(|(parameter, _)| parameter).collect() }
 }
 
-/// Numbers beside those of active regions that may be fitted.
-const LINE: [Parameter; 4] =
+/// Numbers beside those of active regions that may be fitted (`star.fitted`).
+pub const FITTED: [Parameter; 4] =
     [Parameter::LineSigma, Parameter::EquivalentWidth, Parameter::Vsini, Parameter::LimbDarkening];
 
 /// Which numbers of the star are fitted to the profiles.
 pub(super) fn fitted_star(star: &Star) -> Result<Vec<Parameter>, Fault> {
     let mut all = Vec::new();
     for name in &star.fitted {
-        let Some(parameter) = LINE.into_iter().find(|parameter| parameter.name() == name) else {
-            let known = LINE.map(|parameter| format!("{:?}", parameter.name())).join(", ");
+        let Some(parameter) = FITTED.into_iter().find(|parameter| parameter.name() == name) else {
+            let known = FITTED.map(|parameter| format!("{:?}", parameter.name())).join(", ");
             return Err(Fault::new("star.fitted", format!("{name:?} is none of {known}")));
         };
         if all.contains(&parameter) {
