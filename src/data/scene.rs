@@ -4,8 +4,8 @@
 mod truth;
 
 use crate::data::calibrated::{Calibrated, of_sets};
-use crate::data::config::{Config, ConfigError, Settings};
-use crate::data::dataset::{Dataset, in_memory};
+use crate::data::config::{Config, ConfigError, DataSetSettings, Settings};
+use crate::data::dataset::{Dataset, in_memory, is_within};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::inference::evidence::EvidenceRecord;
 use crate::inference::search::{self, Found, Progress, SearchError, SearchSettings};
@@ -13,11 +13,16 @@ use crate::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
-use crate::star::observation::Observations;
+use crate::star::observation::{Observations, Profile};
+use crate::surface::calibration::events::Events;
 use crate::surface::calibration::star::MeasuredStar;
+use crate::surface::evolving_map::events::ByHand;
+use crate::surface::evolving_map::star::coarsely;
+use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, NoMaps, SurfaceMaps, SurfaceSettings};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -113,22 +118,91 @@ impl Scene {
     /// Where the profiles have no fit they stay as they are, and what asks for maps says why.
     #[must_use]
     pub fn fitted(self, report: &dyn Fn(&str)) -> Self {
-        let fitted = &self.settings.fitted;
-        if fitted.is_empty() || self.measured.star.is_some() {
+        let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
+        let is_open = !fitted.is_empty() || by_hand.is_some();
+        if !is_open || self.measured.star.is_some() || self.measured.events.is_some() {
             return self;
         }
-        report("fitting active regions");
-        let known = self.settings.known_field();
-        match MeasuredStar::of(&self.imager, self.settings.values, known, fitted) {
-            Ok(star) => self.with_star(star),
+        match self.found(&fitted, by_hand.as_deref(), report) {
+            Ok(found) => self.with_found(&found),
             Err(_) => self,
         }
     }
 
-    /// The same with numbers of the star as they were measured.
+    /// What the profiles say of star and events. Flares would be taken for regions, and regions for flares: events are
+    /// found with plain spots first, and anew with the star that is found without them.
+    fn found(
+        &self,
+        fitted: &[Parameter],
+        by_hand: Option<&[ByHand]>,
+        report: &dyn Fn(&str),
+    ) -> Result<Measured, NoFit> {
+        let (known, values) = (self.settings.known_field(), self.settings.values);
+        let events = |imager: &Imager, near: Assumed| {
+            report("looking for flares and other events");
+            by_hand.map(|by_hand| Events::of(imager, values, &known, near, by_hand)).transpose()
+        };
+        report("fitting active regions");
+        let mut imager = self.imager.clone();
+        let mut plain = coarsely(&imager, values, known)?;
+        let first = events(&imager, plain.marginal.assumed)?;
+        if fitted.is_empty() {
+            return Ok(Measured { events: first, ..Measured::default() });
+        }
+        if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
+            imager = imager.with_larger_errors(&first.factors(self.observations.profiles.len()));
+            plain = coarsely(&imager, values, known)?;
+        }
+        report("fitting active regions");
+        let (star, near) = MeasuredStar::of(&imager, &plain, &known, fitted)?;
+        let mut imager = self.imager.clone();
+        star.put_into(&mut imager);
+        let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
+        Ok(Measured { star: Some(star), events, ..Measured::default() })
+    }
+
+    /// What is known of events among the profiles; `None` where they are not looked for.
+    fn by_hand(&self) -> Option<Vec<ByHand>> {
+        let sets = self.settings.sets.iter().zip(self.imager.profiles_of_sets());
+        let of_set = |(set, profiles): (&DataSetSettings, Range<usize>)| {
+            let of = |profile: &Profile| match &set.events {
+                None => ByHand::Sound,
+                Some(windows) if is_within(&windows.exclude, profile.time_d) => ByHand::Sound,
+                Some(windows) if is_within(&windows.include, profile.time_d) => ByHand::Event,
+                Some(_) => ByHand::Open,
+            };
+            self.observations.profiles[profiles].iter().map(of).collect::<Vec<_>>()
+        };
+        self.settings.sets.iter().any(|set| set.events.is_some()).then(|| sets.flat_map(of_set).collect())
+    }
+
+    /// The same with what was found of star and events.
     #[must_use]
     #[doc(hidden)]
-    pub fn with_star(mut self, star: MeasuredStar) -> Self {
+    pub fn with_found(self, found: &Measured) -> Self {
+        let scene = match &found.star {
+            Some(star) => self.with_star(star.clone()),
+            None => self,
+        };
+        match &found.events {
+            Some(events) if scene.measured.events.is_none() => scene.with_events(events.clone()),
+            _ => scene,
+        }
+    }
+
+    /// The same with larger errors of profiles that are events.
+    fn with_events(mut self, events: Events) -> Self {
+        let factors = events.factors(self.observations.profiles.len());
+        for (profile, factor) in self.observations.profiles.iter_mut().zip(&factors) {
+            profile.sigma.iter_mut().for_each(|sigma| *sigma *= factor);
+        }
+        self.imager = self.imager.with_larger_errors(&factors);
+        self.measured.events = Some(events);
+        self
+    }
+
+    /// The same with numbers of the star as they were measured.
+    fn with_star(mut self, star: MeasuredStar) -> Self {
         star.put_into(&mut self.imager);
         let in_values = |parameter: Parameter| {
             !parameter.is_surface() || self.settings.free.iter().any(|free| free.parameter == parameter)

@@ -200,10 +200,7 @@ impl Evidence {
         let without = |group: &Vec<usize>| {
             assert!(group.is_sorted(), "epochs in order");
             let numbers: Vec<usize> = group.iter().flat_map(|k| self.numbers.parts[*k].clone()).collect();
-            let mut units = DMatrix::zeros(solved.nrows(), numbers.len());
-            numbers.iter().enumerate().for_each(|(column, row)| units[(*row, column)] = 1.0);
-            self.covariance.forward_from(&mut units, &numbers);
-            let factor = Factor::new(dense::gram_of_columns(&units)).ok_or(FieldError::NotPositive)?;
+            let factor = self.precision_of(&numbers)?;
             let left: Vec<usize> = (0..told.len()).filter(|k| group.binary_search(k).is_err()).collect();
             let left: Vec<usize> = left.iter().flat_map(|k| k * per_epoch..(k + 1) * per_epoch).collect();
             let columns: Vec<usize> = std::iter::once(0).chain(left.iter().map(|column| 1 + column)).collect();
@@ -220,6 +217,32 @@ impl Evidence {
             Ok(then(group, others))
         };
         Ok(groups.par_iter().map(without).collect())
+    }
+
+    /// chi2 of each epoch as all others predict it, of these misfits: with `a = C^-1 r`, `a_k^T [(C^-1)_kk]^-1 a_k`
+    /// (Rasmussen & Williams 2006, equations 5.10 to 5.12, for blocks), and what is compressed away.
+    ///
+    /// # Errors
+    /// As [`Evidence::without_each`].
+    pub fn predicted_chi2(&self, misfits: &[DVector<f64>], slopes: &[DMatrix<f64>]) -> Result<Vec<f64>, FieldError> {
+        let told = self.told(misfits, slopes)?;
+        let mut solved = self.covariance.whitened(&told, &self.numbers.parts).columns(0, 1).into_owned();
+        self.covariance.backward(&mut solved);
+        let of = |(told, part): (&Told, &Range<usize>)| {
+            let factor = self.precision_of(&part.clone().collect::<Vec<_>>())?;
+            let mut across = solved.rows(part.start, part.len()).into_owned();
+            factor.forward_from(&mut across, &[0]);
+            Ok(across.norm_squared() + told.chi2)
+        };
+        told.par_iter().zip(&self.numbers.parts).map(of).collect()
+    }
+
+    /// The block of `C^-1` of some `numbers` (ascending), factored.
+    fn precision_of(&self, numbers: &[usize]) -> Result<Factor, FieldError> {
+        let mut units = DMatrix::zeros(self.numbers.rows.nrows(), numbers.len());
+        numbers.iter().enumerate().for_each(|(column, row)| units[(*row, column)] = 1.0);
+        self.covariance.forward_from(&mut units, numbers);
+        Factor::new(dense::gram_of_columns(&units)).ok_or(FieldError::NotPositive)
     }
 
     /// Misfits and slopes of all epochs in the numbers of these.

@@ -14,7 +14,6 @@ use crate::surface::expansion::nuisances;
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -199,14 +198,8 @@ impl Origin {
     /// # Errors
     /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
     pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Density, OriginError> {
-        let (scene, space) = match &self.measured.star {
-            Some(star) => {
-                let scene = scene.clone().with_star(star.clone());
-                let space = scene.space_of(space.free());
-                (Cow::Owned(scene), space)
-            }
-            None => (Cow::Borrowed(scene), space),
-        };
+        let scene = scene.clone().with_found(&self.measured);
+        let space = if self.measured.star.is_some() { scene.space_of(space.free()) } else { space };
         let (surface, imager) = (scene.surface().model(), scene.imager.clone());
         surface.rebuilt(imager, space, &self.reference, &scene.settings.values).map_err(|error| match error {
             RebuildError::Differs { what, then, now } => {

@@ -159,7 +159,7 @@ fn mean(x: impl Iterator<Item = f64>) -> f64 {
 
 /// Probability that chi2 of that many degrees of freedom is larger: its cube root is nearly normal (Wilson & Hilferty
 /// 1931).
-fn chi2_exceeds(chi2: f64, freedom: f64) -> f64 {
+pub(super) fn chi2_exceeds(chi2: f64, freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     cumulative((1.0 - spread - (chi2 / freedom).cbrt()) / spread.sqrt())
 }

@@ -275,6 +275,11 @@ impl Imager {
         Imager { sets, zero_points, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
     }
 
+    /// The same with errors of each profile times its factor.
+    pub fn with_larger_errors(&self, factors: &[f64]) -> Self {
+        Imager { data: self.data.with_larger_errors(&self.bins(), factors), ..self.clone() }
+    }
+
     /// The same of each season by itself.
     pub fn seasons(&self) -> Vec<Self> {
         let map_of = self.map_of_each();

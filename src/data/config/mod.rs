@@ -21,9 +21,10 @@ pub use settings::{
     DataSetSettings, FITTED, GridSettings, LightCurveSettings, LightSource, MOST_NODES, ObservationSource, Settings,
 };
 pub use written::{
-    Automatic, EquivalentWidth, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line,
-    LineShape, Listed, ObservationsSection, OfField, OutlierTreatment, PhotometrySection, PlanSection, SEGMENT_GAP_D,
-    SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM, VelocityDrift, VelocityJitter, ZeroPoint,
+    Automatic, EquivalentWidth, EventWindows, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection,
+    LimbLaw, Line, LineShape, Listed, ObservationsSection, OfField, OutlierTreatment, PhotometrySection, PlanSection,
+    SEGMENT_GAP_D, SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM, VelocityDrift, VelocityJitter,
+    ZeroPoint,
 };
 
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.

@@ -2,6 +2,7 @@
 
 use crate::numerics::json::Part;
 use crate::surface::ConstantVelocity;
+use crate::surface::calibration::events::Events;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
@@ -52,6 +53,9 @@ pub struct Measured {
     /// `star.regions`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub star: Option<MeasuredStar>,
+    /// `observations.events`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub events: Option<Events>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
@@ -133,6 +137,7 @@ impl Measured {
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("RV jitter", jitter.line()));
         let star = self.star.as_ref().map(|star| ("fitted star", star.line()));
+        let events = self.events.as_ref().and_then(Events::line).map(|line| ("events", line));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
             let Season { first_d, last_d, profiles, .. } = season;
@@ -141,6 +146,15 @@ impl Measured {
         let seasons = self.seasons.iter().map(season);
         let light =
             self.light_curves.iter().chain(&self.light_curve_notes).map(|remark| ("light curve", remark.clone()));
-        profiles.chain(sets).chain(seasons).chain(light).chain(errors).chain(jitter).chain(star).chain(target).collect()
+        profiles
+            .chain(sets)
+            .chain(seasons)
+            .chain(light)
+            .chain(errors)
+            .chain(jitter)
+            .chain(star)
+            .chain(events)
+            .chain(target)
+            .collect()
     }
 }

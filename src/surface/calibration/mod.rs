@@ -2,6 +2,7 @@
 //! their uncertainties are ([`noise`]), the RV jitter ([`jitter`]), RV offsets between data sets ([`offsets`]), and the
 //! target chi2 ([`target`]).
 
+pub mod events;
 pub mod first_look;
 pub mod jitter;
 pub mod noise;

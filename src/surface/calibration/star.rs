@@ -8,8 +8,8 @@
 use crate::model::{Parameter, ParameterValues};
 use crate::star::LocalLine;
 use crate::surface::Known;
-use crate::surface::evolving_map::NoFit;
-use crate::surface::evolving_map::star::{FittedStar, StarPrior, coarsely, fit_star};
+use crate::surface::evolving_map::star::{FittedStar, StarPrior, fit_star};
+use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 
@@ -77,13 +77,16 @@ pub struct MeasuredStar {
 }
 
 impl MeasuredStar {
-    /// Of the profiles of `imager`, the other parameters at `values`, without a planet.
+    /// Of the profiles of `imager`, the other parameters at `values`, without a planet, from a field like that of `plain`
+    /// spots there; and the field that goes with it.
     ///
     /// # Errors
     /// [`NoFit`].
-    pub fn of(imager: &Imager, mut values: ParameterValues, known: Known, fitted: &[Parameter]) -> Result<Self, NoFit> {
-        values.set(Parameter::K, 0.0);
-        let plain = coarsely(imager, values, known)?;
+    pub fn of(imager: &Imager, plain: &Fitted, known: &Known, fitted: &[Parameter]) -> Result<(Self, Assumed), NoFit> {
+        let values = plain.marginal.values;
+        if fitted.is_empty() {
+            return Ok((MeasuredStar::default(), plain.marginal.assumed));
+        }
         let star = imager.star.with(&values.surface);
         let value = |parameter: Parameter| match parameter {
             Parameter::LineSigma => {
@@ -95,18 +98,19 @@ impl MeasuredStar {
             _ => values.get(parameter).unwrap_or(0.0),
         };
         let priors: Vec<StarPrior> = fitted.iter().map(|parameter| prior(*parameter, value(*parameter))).collect();
-        let FittedStar { values, sd, mean_profile, ln_evidence, ln_prior } = fit_star(imager, &plain, &known, &priors)?;
+        let FittedStar { values, sd, mean_profile, ln_evidence, ln_prior, assumed } =
+            fit_star(imager, plain, known, &priors)?;
         let told: f64 = sd.iter().zip(&priors).map(|(sd, prior)| (sd / prior.sd).min(1.0).ln()).sum();
         let gain = ln_evidence - plain.ln_evidence;
         if gain + ln_prior + told < NEEDED {
-            return Ok(MeasuredStar { gain, ..MeasuredStar::default() });
+            return Ok((MeasuredStar { gain, ..MeasuredStar::default() }, plain.marginal.assumed));
         }
         let number = |(prior, sigma): (&StarPrior, &f64)| FittedNumber {
             name: prior.parameter.name().to_owned(),
             value: values[prior.parameter],
             sigma: *sigma,
         };
-        Ok(MeasuredStar { numbers: priors.iter().zip(&sd).map(number).collect(), mean_profile, gain })
+        Ok((MeasuredStar { numbers: priors.iter().zip(&sd).map(number).collect(), mean_profile, gain }, assumed))
     }
 
     /// Puts what was found into what profiles are imaged with.

@@ -64,6 +64,17 @@ impl Marginal {
         Ok(all.into_iter().map(Result::flatten).collect())
     }
 
+    /// chi2 of each profile as all others predict it.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn predicted_chi2(&self, imager: &Imager, basis: &Basis) -> Result<Vec<f64>, FieldError> {
+        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, &[]);
+        let mut all = self.settled.evidence.predicted_chi2(&misfits, &slopes)?;
+        all.truncate(self.design.response().profiles());
+        Ok(all)
+    }
+
     fn with_zero_points_integrated(
         &self,
         imager: &Imager,

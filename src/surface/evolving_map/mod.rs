@@ -20,6 +20,7 @@ mod climb;
 mod condense;
 mod density;
 mod design;
+pub mod events;
 mod expand;
 pub(in crate::surface) mod fit;
 mod forecast;

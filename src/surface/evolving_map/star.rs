@@ -73,6 +73,8 @@ pub struct FittedStar {
     pub ln_evidence: f64,
     /// ln of the prior density.
     pub ln_prior: f64,
+    /// The field that goes with it.
+    pub assumed: Assumed,
 }
 
 /// A point of a climb.
@@ -102,11 +104,12 @@ struct Climb<'a> {
     limits: Vec<(f64, f64)>,
 }
 
-/// The field of the star at `values` by harmonics up to a low degree.
+/// The field of the star at `values`, without a planet, by harmonics up to a low degree.
 ///
 /// # Errors
 /// [`NoFit`].
-pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
+pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
+    values.set(Parameter::K, 0.0);
     fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
 }
 
@@ -436,6 +439,7 @@ impl<'a> Climb<'a> {
             mean_profile,
             ln_evidence: here.marginal.ln_evidence(),
             ln_prior,
+            assumed: here.marginal.assumed,
         }
     }
 

@@ -39,6 +39,15 @@ impl Data {
         Data { depth: of(&self.depth), inverse_variance, correlated_bins: self.correlated_bins, nuisances }
     }
 
+    /// The same with errors of each profile, which has these `bins`, times its factor.
+    pub fn with_larger_errors(&self, profiles: &[Range<usize>], factors: &[f64]) -> Self {
+        let mut larger = self.clone();
+        for (bins, factor) in profiles.iter().zip(factors) {
+            larger.inverse_variance[bins.clone()].iter_mut().for_each(|weight| *weight /= factor * factor);
+        }
+        larger.of_profiles(profiles)
+    }
+
     /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see
     /// another's bins.
     #[inline(always)]

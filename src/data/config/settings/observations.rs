@@ -6,7 +6,9 @@ use super::checks::{
 use super::simulation::{simulation, spots, times_d};
 use super::star::resolve_star;
 use crate::data::config::error::Fault;
-use crate::data::config::written::{Automatic, Config, Instrument, ObservationsSection, VelocityJitter, ZeroPoint};
+use crate::data::config::written::{
+    Automatic, Config, EventWindows, EventsKey, EventsWord, Instrument, ObservationsSection, VelocityJitter, ZeroPoint,
+};
 use crate::data::simulate::Simulation;
 use crate::model::{Parameter, ParameterValues};
 use crate::star::{BrightnessModel, StarSettings};
@@ -35,6 +37,8 @@ pub struct DataSetSettings {
     pub zero_point: ZeroPoint,
     /// Windows of time (d) whose profiles are left out.
     pub exclude: Vec<[f64; 2]>,
+    /// What is known of profiles that the others do not predict; `None` where they are not looked for.
+    pub events: Option<EventWindows>,
 }
 
 impl DataSetSettings {
@@ -87,6 +91,7 @@ pub(super) fn resolve_sets(
 ) -> Result<Vec<DataSetSettings>, Fault> {
     check_several(written)?;
     let mut sets = Vec::new();
+    let has_field = written.imaging.objective.properties().has_field;
     for s in 0..written.observations.sections.len() {
         let key = written.observations.key(s);
         let star = star_of(written, s, &key, star, values)?;
@@ -106,12 +111,28 @@ pub(super) fn resolve_sets(
             nuisances: section.nuisances.or(written.imaging.nuisances),
             zero_point: section.zero_point_kms,
             exclude: section.exclude.clone(),
+            events: events(section.events.as_ref(), has_field, &key)?,
             key,
         });
     }
     names(&sets.iter().map(|set| (&*set.key, &*set.name)).collect::<Vec<_>>())?;
     of_one_star(written, &mut sets)?;
     Ok(sets)
+}
+
+/// What is known of events, checked; they are looked for where maps evolve.
+fn events(written: Option<&EventsKey>, has_field: bool, key: &str) -> Result<Option<EventWindows>, Fault> {
+    let key = format!("{key}.events");
+    match written {
+        Some(EventsKey::Word(EventsWord::None)) => Ok(None),
+        Some(_) if !has_field => Err(Fault::new(&key, "no effect but with imaging.objective \"marginal-likelihood\"")),
+        Some(EventsKey::Windows(windows)) => {
+            check_windows(&windows.include, &format!("{key}.include"))?;
+            check_windows(&windows.exclude, &format!("{key}.exclude"))?;
+            Ok(Some(windows.clone()))
+        }
+        Some(EventsKey::Word(EventsWord::Fitted)) | None => Ok(has_field.then(EventWindows::default)),
+    }
 }
 
 /// What several sets need, and what one has no use for.

@@ -15,7 +15,7 @@ mod star;
 pub use imaging::ImagingSettings;
 pub use listed::Listed;
 pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
-pub use observations::{ObservationsSection, SimulateSection, VelocitySection};
+pub use observations::{EventWindows, EventsKey, EventsWord, ObservationsSection, SimulateSection, VelocitySection};
 pub use per_parameter::{PerParameter, Planet};
 pub use photometry::{OutlierTreatment, PhotometrySection, SEGMENT_GAP_D, SimulatedLight};
 pub use star::{

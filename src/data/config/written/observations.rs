@@ -75,9 +75,46 @@ pub struct ObservationsSection {
     /// With `path`: windows of time `[start, end]` (d), transits for example: profiles within are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<[f64; 2]>,
+    /// Profiles that all others do not predict, as of flares: "fitted", their errors are multiplied by what the others
+    /// ask for; "none", they are profiles like all others. "fitted" with the objective "marginal-likelihood" if not
+    /// given. Or by hand, times that are never events, and times that always are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub events: Option<EventsKey>,
     /// Simulated profiles of the star and planet of this config. In a list of data sets the first one has the spots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
+}
+
+/// Profiles that all others do not predict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum EventsKey {
+    /// Whether they are looked for.
+    Word(EventsWord),
+    /// They are looked for, but for some that are known.
+    Windows(EventWindows),
+}
+
+/// Whether events are looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EventsWord {
+    /// They are.
+    Fitted,
+    /// They are not.
+    None,
+}
+
+/// Windows of time `[start, end]` (d) in which profiles are, or are not, events.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EventWindows {
+    /// Profiles within are events: their errors are multiplied by 3 at least.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub include: Vec<[f64; 2]>,
+    /// Profiles within are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exclude: Vec<[f64; 2]>,
 }
 
 /// Simulated profiles.
