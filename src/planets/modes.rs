@@ -6,7 +6,7 @@
 
 use crate::numerics::quantile::quantile;
 use crate::planets::periodogram::RotationPeriods;
-use crate::planets::verdict::Remark;
+use crate::planets::verdict::{PeriodShare, Remark, UNAMBIGUOUS};
 use serde::{Deserialize, Serialize};
 
 /// Smoothing, in inverse time bases.
@@ -29,9 +29,6 @@ const BROAD: f64 = 1.0;
 
 /// A period in no more modes than this, which hold at least that share of the draws, is constrained.
 const FEW: (usize, f64) = (3, 0.68);
-
-/// A mode of more weight than this has no rival.
-const ALONE: f64 = 0.95;
 
 /// A mode of the period.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,11 +72,17 @@ pub fn doubts(modes: &[PeriodMode]) -> Vec<Remark> {
         Remark::against(format!("P {words}"), text)
     });
     let share = 100.0 * heaviest.weight;
-    let rivals = (heaviest.weight < ALONE).then(|| {
+    let rivals = (heaviest.weight < UNAMBIGUOUS).then(|| {
         let text = format!("Period ambiguous: the main mode holds {share:.0} % of the posterior.");
-        Remark::against("period ambiguous", text)
+        Remark::note(text)
     });
     of_the_star.into_iter().chain(rivals).collect()
+}
+
+/// The modes as shares of the posterior.
+pub fn shares(modes: &[PeriodMode], rotation_period_d: f64) -> Vec<PeriodShare> {
+    let of = |mode: &PeriodMode| PeriodShare { period_d: rotation_period_d * mode.porb_over_prot, share: mode.weight };
+    modes.iter().map(of).collect()
 }
 
 impl PeriodMode {

@@ -13,8 +13,12 @@ pub const CANDIDATE_FAP: f64 = 0.01;
 /// Below this false-alarm probability a candidate against which nothing speaks is a detection.
 pub const DETECTION_FAP: f64 = 1e-3;
 
-/// Another peak that is lower by less than this in ln L may as well be the true one: odds of 20 to 1.
-pub const AMBIGUOUS: f64 = 3.0;
+/// A period with a smaller posterior share than this is ambiguous: odds of 20 to 1.
+pub const UNAMBIGUOUS: f64 = 0.95;
+
+/// Periods of a smaller share are not told.
+const LEAST_SHARE: f64 = 0.02;
+const MOST_PERIODS: usize = 4;
 
 /// What the profiles say of a planet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,6 +61,15 @@ impl Remark {
     pub fn note(text: impl Into<String>) -> Self {
         Remark { against: None, text: text.into() }
     }
+}
+
+/// A period with its share of the posterior.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeriodShare {
+    /// Period (d).
+    pub period_d: f64,
+    /// Its share, from 0 to 1.
+    pub share: f64,
 }
 
 /// The orbit that is judged.
@@ -109,6 +122,10 @@ pub struct Verdict {
     pub signal: Option<Signal>,
     /// What speaks against a planet, in a few words each.
     pub against: Vec<String>,
+    /// Periods with their posterior shares, the largest first, where none has all but 5 %: aliases of each other by the
+    /// sampling, or periods that the profiles do not tell apart. Empty where the period is unambiguous.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub periods: Vec<PeriodShare>,
     /// Of a planet of known ephemeris, of which no other period is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub known: Option<Known>,
@@ -164,7 +181,7 @@ impl Verdict {
         };
         let sentence = match known {
             Some(known) => sentence_of_known(finding, false_alarm_probability, &signal, &known, &against),
-            None => sentence(finding, false_alarm_probability, &signal, &against),
+            None => sentence(finding, false_alarm_probability, &signal, &against, &[]),
         };
         Verdict {
             finding,
@@ -172,8 +189,26 @@ impl Verdict {
             false_alarm_probability: Some(false_alarm_probability),
             signal: Some(signal),
             against,
+            periods: Vec::new(),
             known,
         }
+    }
+
+    /// The same of a period that has these posterior shares (in any order, summing to 1 or less): a planet may be
+    /// detected while its period is not.
+    pub fn with_periods(mut self, mut shares: Vec<PeriodShare>) -> Self {
+        shares.sort_by(|a, b| b.share.total_cmp(&a.share));
+        let is_clear = shares.first().is_none_or(|first| first.share > UNAMBIGUOUS);
+        shares.retain(|of| of.share >= LEAST_SHARE);
+        shares.truncate(MOST_PERIODS);
+        if is_clear || self.known.is_some() || shares.len() < 2 {
+            return self;
+        }
+        self.periods = shares;
+        if let (Some(probability), Some(signal)) = (self.false_alarm_probability, self.signal) {
+            self.sentence = sentence(self.finding, probability, &signal, &self.against, &self.periods);
+        }
+        self
     }
 
     /// The same with more that speaks against it: a detection becomes a candidate.
@@ -183,7 +218,7 @@ impl Verdict {
         };
         let mut all: Vec<Remark> = self.against.iter().map(|short| Remark::against(short, "")).collect();
         all.extend_from_slice(remarks);
-        Verdict::judged(probability, signal, &all, self.known)
+        Verdict::judged(probability, signal, &all, self.known).with_periods(self.periods)
     }
 
     /// Where there is no judgement, and why.
@@ -194,6 +229,7 @@ impl Verdict {
             false_alarm_probability: None,
             signal: None,
             against: Vec::new(),
+            periods: Vec::new(),
             known: None,
         }
     }
@@ -217,7 +253,23 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
     )
 }
 
-fn sentence(finding: Finding, false_alarm_probability: f64, signal: &Signal, against: &[String]) -> String {
+fn sentence(
+    finding: Finding,
+    false_alarm_probability: f64,
+    signal: &Signal,
+    against: &[String],
+    periods: &[PeriodShare],
+) -> String {
+    let ambiguous = match (finding.is_signal(), periods) {
+        (false, _) | (true, []) => String::new(),
+        (true, periods) => {
+            let of = |PeriodShare { period_d, share }: &PeriodShare| {
+                format!("{period_d:.0$} d ({1:.0} %)", if *period_d < 1.0 { 3 } else { 2 }, 100.0 * share)
+            };
+            format!(", period ambiguous: {}", periods.iter().map(of).collect::<Vec<_>>().join(", "))
+        }
+    };
+    let orbit_head = if ambiguous.is_empty() { ": " } else { ". Highest peak: " };
     let (orbit, chance) = (signal.words(), false_alarm(false_alarm_probability));
     let percent = |share: f64| 100.0 * share;
     match finding {
@@ -227,10 +279,13 @@ fn sentence(finding: Finding, false_alarm_probability: f64, signal: &Signal, aga
         }
         Finding::Candidate if against.is_empty() => {
             let threshold = percent(DETECTION_FAP);
-            format!("Candidate: {orbit}, {chance} (a detection requires < {threshold} %).")
+            format!("Candidate{ambiguous}{orbit_head}{orbit}, {chance} (a detection requires < {threshold} %).")
         }
-        Finding::Candidate => format!("Candidate: {orbit}, {chance}.{}", caveats(against)),
-        Finding::Detection => format!("Detection: {orbit}, {chance}; all diagnostics passed."),
+        Finding::Candidate => format!("Candidate{ambiguous}{orbit_head}{orbit}, {chance}.{}", caveats(against)),
+        Finding::Detection if ambiguous.is_empty() => {
+            format!("Detection: {orbit}, {chance}; all diagnostics passed.")
+        }
+        Finding::Detection => format!("Detection{ambiguous}{orbit_head}{orbit}, {chance}."),
         Finding::NotJudged => String::new(),
     }
 }
@@ -291,6 +346,24 @@ mod tests {
         assert!(less.sentence.ends_with("Caveats: driven by a single night."), "{}", less.sentence);
         assert_eq!(Verdict::of_known([0.01, 0.01], SIGNAL, 0.12, &[]).finding, Finding::NoPlanetNeeded);
         assert_eq!(Verdict::of_known([0.0, 0.0], SIGNAL, 0.12, &[]).finding, Finding::NotJudged);
+    }
+
+    #[test]
+    fn a_planet_may_be_detected_while_its_period_is_not() {
+        let share = |period_d: f64, share: f64| PeriodShare { period_d, share };
+        let of = |shares: Vec<PeriodShare>| Verdict::new(1e-5, SIGNAL, &[]).with_periods(shares);
+        let two = of(vec![share(4.93, 0.4), share(0.831, 0.58), share(1.2, 0.01)]);
+        assert_eq!(two.finding, Finding::Detection);
+        assert_eq!(two.periods, [share(0.831, 0.58), share(4.93, 0.4)]);
+        let head = "Detection, period ambiguous: 0.831 d (58 %), 4.93 d (40 %). Highest peak: P = 5.069";
+        assert!(two.sentence.starts_with(head), "{}", two.sentence);
+        assert!(!two.sentence.contains("all diagnostics"), "{}", two.sentence);
+        let less = two.with(&[Remark::against("driven by a single night", "")]);
+        assert!(less.sentence.starts_with("Candidate, period ambiguous: 0.831 d (58 %)"), "{}", less.sentence);
+        let clear = of(vec![share(4.93, 0.97), share(0.831, 0.03)]);
+        assert!(clear.periods.is_empty() && clear.sentence.starts_with("Detection: "), "{}", clear.sentence);
+        let none = Verdict::new(0.5, SIGNAL, &[]).with_periods(vec![share(4.93, 0.5), share(0.831, 0.5)]);
+        assert!(!none.sentence.contains("ambiguous"), "{}", none.sentence);
     }
 
     #[test]

@@ -113,8 +113,9 @@ impl SpotField {
         let amplitude = self.spot_amplitude;
         (amplitude > LARGEST_AMPLITUDE).then(|| {
             let text = format!(
-                "spot_amplitude is {amplitude:.2}, more than a star can have: spots stand in for something else. Likely \
-                causes: star.line, star.vsini_kms, star.vsys_kms (let star.fitted name them), or observations.sigma_scale"
+                "spot_amplitude is {amplitude:.2}, more than a star can have: spots stand in for something else. \
+                Likely causes: star.line, star.vsini_kms, star.vsys_kms (let star.fitted name them), or \
+                observations.sigma_scale"
             );
             Remark::against("more spots than a star can have", text)
         })

@@ -5,7 +5,8 @@ use super::{Detection, DetectionSettings, Robustness};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
-use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Verdict, decimals};
+use crate::planets::periodogram::peaks::posterior_shares;
+use crate::planets::verdict::{CANDIDATE_FAP, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
 use crate::surface::imaging::Imager;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
@@ -13,6 +14,9 @@ const FEW: usize = 12;
 
 /// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
 const OFFSET_GAIN: f64 = 12.5;
+
+/// A peak of a smaller posterior share than this is no rival.
+const RIVAL: f64 = 0.03;
 
 /// Other peaks that may be the true one, as many as are named.
 const RIVALS_NAMED: usize = 3;
@@ -36,7 +40,7 @@ impl Detection {
         let signal = self.best.signal(self.frequencies.rotation_period_d);
         match self.not_judged() {
             Some(sentence) => Verdict::not_judged(sentence),
-            None => Verdict::new(self.false_alarm_probability(), signal, remarks),
+            None => Verdict::new(self.false_alarm_probability(), signal, remarks).with_periods(self.shares(&|_| true)),
         }
     }
 
@@ -159,29 +163,48 @@ impl Detection {
         }
         let rivals = self.rivals();
         if !rivals.is_empty() {
-            let mut named: Vec<String> = rivals.iter().take(RIVALS_NAMED).map(|peak| self.rival(peak)).collect();
+            let mut named: Vec<String> =
+                rivals.iter().take(RIVALS_NAMED).map(|(peak, share)| self.rival(peak, *share)).collect();
             if rivals.len() > RIVALS_NAMED {
                 named.push(format!("and {} more", rivals.len() - RIVALS_NAMED));
             }
-            remarks.push(Remark::against("period ambiguous", format!("Period ambiguous: {}.", named.join("; "))));
+            remarks.push(Remark::note(format!("Period ambiguous: {}.", named.join("; "))));
         }
         remarks
     }
 
-    /// Peaks that may as well be the true one.
-    fn rivals(&self) -> Vec<&Peak> {
-        let height = |peak: &Peak| peak.orbit.delta_ln_l;
-        let highest = height(self.blind.best());
-        self.blind.peaks[1..].iter().filter(|peak| highest - height(peak) < AMBIGUOUS).collect()
+    /// Posterior shares of the peaks whose `Porb/Prot` is allowed.
+    pub fn shares(&self, is_allowed: &dyn Fn(f64) -> bool) -> Vec<PeriodShare> {
+        let peaks: Vec<&Peak> = self.blind.peaks.iter().filter(|peak| is_allowed(peak.porb_over_prot)).collect();
+        let shares = posterior_shares(&peaks);
+        let of = |(peak, share): (&&Peak, f64)| PeriodShare {
+            period_d: self.frequencies.rotation_period_d * peak.porb_over_prot,
+            share,
+        };
+        peaks.iter().zip(shares).map(of).collect()
     }
 
-    fn rival(&self, peak: &Peak) -> String {
+    /// Peaks that may as well be the true one, the likeliest first, where the highest has a share that leaves room.
+    fn rivals(&self) -> Vec<(&Peak, f64)> {
+        let peaks: Vec<&Peak> = self.blind.peaks.iter().collect();
+        let shares = posterior_shares(&peaks);
+        if shares.iter().any(|share| *share > UNAMBIGUOUS) {
+            return Vec::new();
+        }
+        let mut rivals: Vec<(&Peak, f64)> = peaks.into_iter().zip(shares).skip(1).collect();
+        rivals.retain(|(_, share)| *share >= RIVAL);
+        rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
+        rivals
+    }
+
+    fn rival(&self, peak: &Peak, share: f64) -> String {
         let period_d = self.frequencies.rotation_period_d * peak.porb_over_prot;
         let sigma = peak.sigma_porb_over_prot.map(|sigma| self.frequencies.rotation_period_d * sigma);
         let digits = decimals(sigma.unwrap_or(f64::NAN));
         let below = self.blind.best().orbit.delta_ln_l - peak.orbit.delta_ln_l;
         let alias = if peak.alias.is_some() { " (sampling alias)" } else { "" };
-        format!("P = {period_d:.digits$} d{alias} is worse by only Δln L = {below:.1}")
+        let percent = 100.0 * share;
+        format!("P = {period_d:.digits$} d{alias} has {percent:.0} % of the posterior (Δln L = -{below:.1})")
     }
 
     /// Whether the result depends on a choice.
@@ -192,6 +215,16 @@ impl Detection {
             remarks.push(Remark::against(
                 "K depends on the target χ²",
                 format!("K shifts by {errors:.1}σ when imaging.chi2_target changes by 3 %: quote the range."),
+            ));
+        }
+        if let Some(held) = robustness.held_out().filter(|held| self.is_candidate() && held.sum < 0.0) {
+            remarks.push(Remark::against(
+                "held-out nights are not predicted better",
+                format!(
+                    "Each night, predicted by all others, is no more probable with the planet: Δln p = {:.1} ± {:.1} \
+                    over {} nights.",
+                    held.sum, held.scatter, held.nights
+                ),
             ));
         }
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);

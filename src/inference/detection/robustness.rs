@@ -8,6 +8,7 @@ use super::{Detection, DetectionSettings};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, orbits};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::star::Orbit;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, AtTarget};
 
@@ -32,6 +33,20 @@ pub struct WithoutNight {
     pub profiles: usize,
     /// The orbit of all others; `None` where none is bounded, or there is no image or evidence.
     pub orbit: Option<CircularOrbit>,
+    /// ln p of these profiles given all others, with the orbit that these have at the best period, above that without
+    /// a planet.
+    pub delta_ln_p: Option<f64>,
+}
+
+/// Whether nights that are held out are predicted better with the planet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldOut {
+    /// Sum of the Delta ln p of all nights.
+    pub sum: f64,
+    /// Standard deviation of the sum, by the scatter of the nights.
+    pub scatter: f64,
+    /// Number of nights.
+    pub nights: usize,
 }
 
 /// The best orbit under other choices, its period kept.
@@ -81,14 +96,23 @@ pub fn robustness(
     let targets = targets.into_iter().zip(heights);
     let targets = targets.map(|(at, blind)| AtTarget { orbit: with_height(at.orbit, blind), ..at }).collect();
     let heights = surface.without_each(alone, star, &nights, &blind);
-    let without = without.into_iter().zip(heights).map(|(orbit, blind)| with_height(orbit, blind));
+    // ln p of a night given all others is the difference of two heights of one orbit
+    let of_all = found.jitters();
+    let held_out = |of_others: Option<CircularOrbit>| {
+        let CircularOrbit { k_kms, phi, delta_ln_l, .. } = of_others?;
+        let orbit = Orbit { k_kms, porb_over_prot: peak.porb_over_prot, phi };
+        Some(of_all.delta_ln_l(&orbit) - delta_ln_l)
+    };
+    let without = without.into_iter().zip(heights);
+    let without = without.map(|(orbit, blind)| (with_height(orbit, blind), held_out(blind)));
     let all = with_height(orbit(&found.last().quadratic), blind(&star.quadratic));
-    let without = nights.iter().zip(without).map(|(night, orbit)| {
+    let without = nights.iter().zip(without).map(|(night, (orbit, delta_ln_p))| {
         let times = || night.iter().map(|&k| times_d[k]);
         WithoutNight {
             span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
             profiles: night.len(),
             orbit,
+            delta_ln_p,
         }
     });
     Robustness { all, targets, nights: without.collect() }
@@ -107,6 +131,15 @@ pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
 }
 
 impl Robustness {
+    /// How much better held-out nights are predicted with the planet; `None` for less than two.
+    pub fn held_out(&self) -> Option<HeldOut> {
+        let all: Vec<f64> = self.nights.iter().filter_map(|night| night.delta_ln_p).collect();
+        let (nights, sum) = (all.len(), all.iter().sum::<f64>());
+        let mean = sum / nights as f64;
+        let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (nights as f64 - 1.0);
+        (nights > 1).then(|| HeldOut { sum, scatter: (nights as f64 * variance).sqrt(), nights })
+    }
+
     /// By how many of its errors K differs between targets, where that is worth a warning.
     pub fn target_matters(&self) -> Option<f64> {
         let orbits: Vec<CircularOrbit> = self.targets.iter().filter_map(|at| at.orbit).collect();
@@ -150,7 +183,7 @@ mod tests {
     #[test]
     fn what_hangs_on_a_choice_is_named() {
         let at = |k| AtTarget { chi2_target: 1.0, on_target: true, orbit: orbit(k, 0.02, 20.0) };
-        let night = |orbit| WithoutNight { span_d: (0.0, 0.2), profiles: 4, orbit };
+        let night = |orbit| WithoutNight { span_d: (0.0, 0.2), profiles: 4, orbit, delta_ln_p: Some(1.0) };
         let nights = vec![
             night(orbit(0.21, 0.025, 15.0)),
             night(orbit(0.2, 0.03, 7.0)),
@@ -158,6 +191,7 @@ mod tests {
             night(None),
         ];
         let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets: vec![at(0.205), at(0.2), at(0.192)], nights };
+        assert_eq!(steady.held_out(), Some(HeldOut { sum: 4.0, scatter: 0.0, nights: 4 }));
         assert_eq!(steady.target_matters(), None);
         let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();
         assert_eq!(decisive, vec![orbit(0.2, 0.03, 7.0), orbit(0.27, 0.0225, 15.0), None]);

@@ -7,6 +7,7 @@
 
 use super::orbits::{CircularOrbit, Trial, scan};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::star::Orbit;
 use nalgebra::{DMatrix, DVector};
 
 /// Sizes that are tried, of the one found without a planet.
@@ -124,6 +125,16 @@ impl Jitters {
     /// no planet beside the jitter that suits this best. `None` where no orbit is bounded.
     pub fn orbit_at(&self, frequency: f64) -> Option<CircularOrbit> {
         self.scan(&[frequency])[0].trial_above_no_planet().orbit
+    }
+
+    /// Height of an orbit beside the jitter that suits it best above no planet beside the jitter that suits this best.
+    pub fn delta_ln_l(&self, orbit: &Orbit) -> f64 {
+        let height = |level: &Level| {
+            let quadratic = &level.quadratic;
+            let velocities = DVector::from_iterator(quadratic.len(), orbit.velocities_kms(&quadratic.cycles));
+            level.ln_l + quadratic.log_likelihood(&velocities)
+        };
+        self.levels.iter().map(height).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// With the size that suits the star without a planet best.

@@ -54,6 +54,19 @@ impl Peak {
     }
 }
 
+/// Shares of the posterior that peaks have among themselves: heights times volumes of their Gaussians, under priors
+/// uniform in K and phase and log-uniform in the period. A peak on the edge of the search has none.
+pub fn posterior_shares(peaks: &[&Peak]) -> Vec<f64> {
+    let highest = peaks.iter().map(|peak| peak.orbit.delta_ln_l).fold(f64::NEG_INFINITY, f64::max);
+    let weight = |peak: &&Peak| {
+        let volume = peak.covariance.map_or(0.0, |covariance| covariance.determinant().max(0.0).sqrt());
+        (peak.orbit.delta_ln_l - highest).exp() * volume / peak.porb_over_prot
+    };
+    let weights: Vec<f64> = peaks.iter().map(weight).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| if sum > 0.0 { weight / sum } else { 0.0 }).collect()
+}
+
 /// Parameters (a, b, frequency) of a circular orbit.
 pub(super) fn parameters(cycles: &[f64], peak: &Peak) -> DVector<f64> {
     let frequency = 1.0 / peak.porb_over_prot;

@@ -84,4 +84,5 @@ fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict 
     let CircularOrbit { k_kms, sigma_k_kms, delta_ln_l, .. } = orbit;
     let signal = Signal { period_d: rotation_period_d * porb_over_prot, sigma_period_d, k_kms, sigma_k_kms };
     Verdict::new(found.blind.false_alarm.probability(delta_ln_l).value(), signal, &remarks)
+        .with_periods(found.shares(&|ratio| periods.contain(ratio)))
 }

@@ -3,7 +3,7 @@
 use super::quantities::QuantitiesRecord;
 use super::search::BlindSearch;
 use crate::data::io::provenance::Provenance;
-use crate::inference::detection::{Robustness, WithoutNight};
+use crate::inference::detection::{HeldOut, Robustness, WithoutNight};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{OrbitQuantities, ParameterValues};
 use crate::numerics::json::number_or_null;
@@ -267,6 +267,26 @@ pub struct RobustnessRecord {
     pub targets: Vec<TargetRecord>,
     /// K at the best period without each night; empty for profiles of one night.
     pub without_night: Vec<NightRecord>,
+    /// The sum over them of what the planet adds to their prediction; null for less than two nights.
+    #[serde(default)]
+    pub held_out_nights: Option<HeldOutRecord>,
+}
+
+/// Whether nights that are held out are predicted better with the planet.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutRecord {
+    /// Sum of `delta_ln_p` of all nights; above 0 where the planet predicts them better.
+    pub delta_ln_p: f64,
+    /// Its standard deviation, by the scatter of the nights.
+    pub sigma_delta_ln_p: f64,
+    /// Number of nights.
+    pub nights: usize,
+}
+
+impl From<HeldOut> for HeldOutRecord {
+    fn from(HeldOut { sum, scatter, nights }: HeldOut) -> Self {
+        HeldOutRecord { delta_ln_p: sum, sigma_delta_ln_p: scatter, nights }
+    }
 }
 
 /// The orbit at the best period with another target chi2.
@@ -290,6 +310,10 @@ pub struct NightRecord {
     pub last_time_d: f64,
     /// Number of profiles left out.
     pub profiles: usize,
+    /// ln p of the profiles left out given all others, with the orbit of these above that without a planet; null where
+    /// these bound no orbit.
+    #[serde(default)]
+    pub delta_ln_p: Option<f64>,
     /// The orbit.
     #[serde(flatten)]
     pub orbit: QuickRecord,
@@ -466,8 +490,10 @@ impl RobustnessRecord {
             last_time_d: night.span_d.1,
             profiles: night.profiles,
             orbit: QuickRecord::of(night.orbit),
+            delta_ln_p: night.delta_ln_p,
         };
         RobustnessRecord {
+            held_out_nights: found.held_out().map(HeldOutRecord::from),
             targets: found.targets.iter().map(target).collect(),
             without_night: found.nights.iter().map(night).collect(),
         }

@@ -3,8 +3,8 @@
 
 use super::quantities::QuantitiesRecord;
 use super::record::{
-    FalseAlarmRecord, KeplerianRecord, NightRecord, OrbitRecord, PeakRecord, PeriodogramFile, QuickRecord,
-    RobustnessRecord,
+    FalseAlarmRecord, HeldOutRecord, KeplerianRecord, NightRecord, OrbitRecord, PeakRecord, PeriodogramFile,
+    QuickRecord, RobustnessRecord,
 };
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
@@ -157,7 +157,14 @@ fn robustness(found: &RobustnessRecord) -> String {
         format!("without night {:.2}, {} profile{plural}", night.first_time_d, night.profiles)
     };
     rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
-    aligned(&rows)
+    let held = found.held_out_nights.map_or_else(String::new, |held| {
+        let HeldOutRecord { delta_ln_p, sigma_delta_ln_p, nights } = held;
+        format!(
+            "held-out nights: Δln p = {delta_ln_p:.1} ± {sigma_delta_ln_p:.1} with the planet, over {nights} nights, \
+            each predicted by all others\n"
+        )
+    });
+    aligned(&rows) + &held
 }
 
 fn chance(alarm: &FalseAlarmRecord) -> String {

@@ -8,7 +8,7 @@ use crate::data::config::Settings;
 use crate::model::{Clock, Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
 use crate::numerics::quantile::quantile;
 use crate::numerics::text::aligned;
-use crate::planets::modes::{PeriodMode, are_few, doubts, period_modes};
+use crate::planets::modes::{PeriodMode, are_few, doubts, period_modes, shares};
 use crate::planets::periodogram::RotationPeriods;
 use crate::planets::verdict::{Remark, Verdict};
 use crate::runs::blind_search::SearchSummary;
@@ -128,7 +128,8 @@ impl RunSummary {
         match search.filter(|_| is_planet_sampled) {
             Some(search) => {
                 let remarks = summary.of_the_planet(settings, search);
-                summary.verdict = Some(search.verdict.clone().with(&remarks));
+                let verdict = search.verdict.clone().with(&remarks);
+                summary.verdict = Some(verdict.with_periods(shares(&summary.period_modes, rotation_period_d)));
                 let all = search.remarks.iter().chain(&remarks).map(|remark| &remark.text);
                 summary.remarks = all.filter(|text| !text.is_empty()).cloned().collect();
             }
