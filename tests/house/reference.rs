@@ -15,6 +15,7 @@ const UNITS: &[(&str, &str)] = &[
     ("photosphere_k", "K"),
     ("spot_k", "K"),
     ("_nm", "nm"),
+    ("_ms", "m/s"),
     ("_msun", "solar masses"),
     ("phi", "cycles"),
     ("cycles", "cycles"),

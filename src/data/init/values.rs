@@ -197,7 +197,11 @@ impl Values {
             porb_over_prot: porb_over_prot_range,
             vsys_kms: self.vsys_range(vsys_kms, ledger),
         };
-        let instrument = Instrument { resolving_power: Some(self.resolving_power) };
+        let name = known.instrument_name.as_ref().map(|given| {
+            ledger.note("instrument.name", given.value, "", Source::Given, given.by.as_str());
+            given.value.to_owned()
+        });
+        let instrument = Instrument { name, resolving_power: Some(self.resolving_power), stability_ms: None };
         Draft::new(star, instrument, (Vec::new(), light), imaging, sought, porb_over_prot)
     }
 
