@@ -73,7 +73,7 @@ impl Values {
         let resolving_power = ledger.settle(
             ("instrument.resolving_power", ""),
             &known.resolving_power,
-            assume(assumed::RESOLVING_POWER, "--resolving-power"),
+            assume(assumed::RESOLVING_POWER, "--instrument, or --resolving-power"),
         );
         let limb_darkening = ledger.settle(
             ("star.limb_darkening", ""),
@@ -178,7 +178,7 @@ impl Values {
             wavelength_nm: ledger.settle(
                 ("star.wavelength_nm", "nm"),
                 &known.wavelength_nm,
-                assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --wavelength"),
+                assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --instrument, or --wavelength"),
             ),
             contrast: None,
             line: Line {
