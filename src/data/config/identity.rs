@@ -5,9 +5,9 @@ use crate::model::{Elements, Parameter};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the
-/// names of star and spectrograph, the star's mass (with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent of the order of
-/// keys.
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the names of
+/// star and spectrograph, the star's mass (with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent
+/// of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
