@@ -72,7 +72,7 @@ pub struct Settings {
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
-    /// `plan`, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// `plan`, names, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change on resuming.
     pub sha256: String,
 }
 
