@@ -2,7 +2,7 @@
 
 use super::output::ConfigFile;
 use super::{Failure, Global, console, progress};
-use crate::data::config::ConfigError;
+use crate::data::config::{ConfigError, Spectrograph};
 use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, LightCurve, List, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
@@ -77,6 +77,10 @@ pub struct KnownArgs {
     /// Standard deviation of the local line (km/s), before instrumental broadening
     #[arg(long, value_name = "KMS")]
     line_sigma: Option<f64>,
+    /// Spectrograph, such as ESPaDOnS, SPIRou or HARPS: its resolving power and wavelength, where these are not given;
+    /// for several lists one each, separated by commas
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    instrument: Vec<String>,
     /// Resolving power of the spectrograph; for several lists one each, separated by commas
     #[arg(long, value_name = "R", value_delimiter = ',')]
     resolving_power: Vec<f64>,
@@ -94,6 +98,9 @@ pub struct KnownArgs {
     #[arg(long, value_name = "N")]
     pixels: Option<usize>,
 }
+
+/// The option that names spectrographs.
+const INSTRUMENT: &str = "--instrument";
 
 /// Where an option's value goes.
 type Slot = fn(&mut Known) -> &mut Option<Given<f64>>;
@@ -120,6 +127,14 @@ impl KnownArgs {
 
     /// The options that are there replace what is `known` otherwise.
     pub fn over(&self, mut known: Known) -> Result<Known, Failure> {
+        if let Some(spectrograph) = self.spectrographs()?.first() {
+            let given = |value: f64| Some(Given { value, by: INSTRUMENT.to_owned() });
+            let by = format!("{INSTRUMENT}; {}", spectrograph.source);
+            known.instrument_name = Some(Given { value: spectrograph.name, by });
+            known.resolving_power = given(spectrograph.resolving_power);
+            // a file says at what wavelength its profiles are
+            known.wavelength_nm = known.wavelength_nm.or(given(spectrograph.wavelength_nm));
+        }
         for (name, value, _, slot) in self.options() {
             if let Some(value) = value {
                 if !value.is_finite() {
@@ -172,10 +187,35 @@ impl KnownArgs {
         Ok((0..lists).map(|s| values.get(s).map(given)).collect())
     }
 
-    /// That options of which several lists have one each are single numbers.
+    /// The spectrographs that are named.
+    fn spectrographs(&self) -> Result<Vec<&'static Spectrograph>, Failure> {
+        let named = |name: &String| {
+            let other = "for any other give --resolving-power and --wavelength";
+            let problem = || format!("{INSTRUMENT}: {}; {other}", Spectrograph::unknown(name));
+            Spectrograph::named(name).ok_or_else(|| Failure::input(problem()))
+        };
+        self.instrument.iter().map(named).collect()
+    }
+
+    /// Resolving powers and wavelengths (nm) for `lists` lists, of their own options or of the named spectrographs;
+    /// what each after the first has of its own.
+    fn instruments(&self, lists: usize) -> Result<[Vec<Option<Given<f64>>>; 2], Failure> {
+        let spectrographs = self.spectrographs()?;
+        let of = |name: &str, values: &[f64], usual: fn(&Spectrograph) -> f64| {
+            let usual: Vec<f64> = spectrographs.iter().map(|spectrograph| usual(spectrograph)).collect();
+            let usual = KnownArgs::of_lists(INSTRUMENT, &usual, lists)?;
+            let given = KnownArgs::of_lists(name, values, lists)?;
+            Ok::<_, Failure>(if values.is_empty() { usual } else { given })
+        };
+        Ok([
+            of("--resolving-power", &self.resolving_power, |spectrograph| spectrograph.resolving_power)?,
+            of("--wavelength", &self.wavelength, |spectrograph| spectrograph.wavelength_nm)?,
+        ])
+    }
+
+    /// That options of which several lists have one each are single values.
     pub fn check_single(&self) -> Result<(), Failure> {
-        KnownArgs::of_lists("--resolving-power", &self.resolving_power, 1)?;
-        KnownArgs::of_lists("--wavelength", &self.wavelength, 1).map(drop)
+        self.instruments(1).map(drop)
     }
 
     /// Why there is no proposal; by its option where a value is at fault that was given by one, and by the `list` where
@@ -236,8 +276,7 @@ impl Args {
                            between them: leave --objective out, or give one list";
             return Err(Failure::input(problem));
         }
-        let powers = KnownArgs::of_lists("--resolving-power", &self.known.resolving_power, lists.len())?;
-        let wavelengths = KnownArgs::of_lists("--wavelength", &self.known.wavelength, lists.len())?;
+        let [powers, wavelengths] = self.known.instruments(lists.len())?;
         let names = names(lists);
         let mut found = Vec::new();
         for (s, (list, list_bytes)) in lists.iter().zip(bytes).enumerate() {

@@ -26,14 +26,15 @@ fn simulated() -> Value {
     })
 }
 
-fn desk() -> Desk {
+/// That star observed.
+pub fn desk() -> Desk {
     let desk = Desk::new(simulated());
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
     desk
 }
 
 /// Few pixels, for the sake of time.
-const INIT: [&str; 8] =
+pub const INIT: [&str; 8] =
     ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "50", "--pixels", "300"];
 
 fn number(config: &Value, pointer: &str) -> f64 {

@@ -18,6 +18,7 @@ mod grid;
 mod import;
 mod init;
 mod injection;
+mod instruments;
 mod light_curves;
 mod limits;
 mod maps;

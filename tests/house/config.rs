@@ -2,7 +2,7 @@
 //! key.
 
 use dimcmc::internals::data::calibrated::star_for;
-use dimcmc::internals::data::config::{self, Config, ConfigError, ObservationSource, Settings};
+use dimcmc::internals::data::config::{self, Config, ConfigError, ObservationSource, SPECTROGRAPHS, Settings};
 use dimcmc::internals::model::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -194,6 +194,40 @@ fn only_what_may_change_on_resuming_leaves_the_fingerprint() {
     }
 }
 
+/// A name gives what is not given beside it, and a new name takes both numbers.
+#[test]
+fn a_spectrograph_has_a_name() {
+    let instrument = |value: Value| resolve(&with(demo(), "/instrument", value));
+    let resolved = |value: Value| {
+        let Settings { star, stability_kms, resolved, .. } = instrument(value).unwrap();
+        (star.line.sigma_kms, stability_kms, resolved["instrument"].clone())
+    };
+    for row in &SPECTROGRAPHS {
+        let (sigma_kms, stability_kms, written) = resolved(json!({ "name": row.name.to_lowercase() }));
+        assert_eq!(sigma_kms, resolved(json!({ "resolving_power": row.resolving_power })).0, "{row:?}");
+        assert_eq!(stability_kms, Some(row.stability_ms / 1e3));
+        assert_eq!(written["resolving_power"], row.resolving_power);
+    }
+    let (_, stability_kms, written) = resolved(json!({ "resolving_power": 50_000 }));
+    assert_eq!((stability_kms, written), (None, json!({ "resolving_power": 50_000.0 })));
+    let (_, stability_kms, written) =
+        resolved(json!({ "name": "HARPS", "resolving_power": 80_000, "stability_ms": 10 }));
+    assert_eq!((stability_kms, &written["resolving_power"]), (Some(0.01), &json!(80_000.0)));
+    assert_eq!(resolved(json!({ "name": "Mine", "resolving_power": 5e4, "stability_ms": 0 })).1, Some(0.0));
+    assert_eq!(resolved(json!({ "stability_ms": 5 })).1, Some(0.005));
+    for number in ["resolving_power", "stability_ms"] {
+        let message = instrument(json!({ "name": "Mine", number: 50 })).unwrap_err();
+        assert!(message.contains("instrument.name: \"Mine\" is none of ESPaDOnS, "), "{message}");
+    }
+    // the wavelength is that of the config, and names of the same spectrograph are one
+    let shas = ["harps-n", "HARPS-N"].map(|name| {
+        let settings = instrument(json!({ "name": name })).unwrap();
+        assert_eq!(settings.resolved["star"]["wavelength_nm"], 550.0);
+        settings.sha256
+    });
+    assert_eq!(shas[0], shas[1]);
+}
+
 #[test]
 fn a_star_has_a_name_in_one_line() {
     let named = |name: Value| resolve(&with(demo(), "/star/name", name));
@@ -346,6 +380,10 @@ fn senseless_values_name_their_key() {
         ),
         ("/star/limb_darkening/law", json!("linea"), "star.limb_darkening.law"),
         ("/instrument/resolving_power", json!(0), "instrument.resolving_power"),
+        ("/instrument/name", json!("espadon"), "instrument.name"),
+        ("/instrument/name", json!(" "), "instrument.name"),
+        ("/instrument/stability_ms", json!(-1), "instrument.stability_ms"),
+        ("/instrument/stability_ms", json!(1.1e5), "instrument.stability_ms"),
         ("/planet/k_kms", json!(-0.1), "planet.k_kms"),
         ("/planet/porb_over_prot", json!(0), "planet.porb_over_prot"),
         ("/imaging/pixels", json!(99), "imaging.pixels"),

@@ -255,13 +255,15 @@ fn the_paths_through_the_code_are_there() {
 
 #[test]
 fn the_reference_of_the_config_is_that_of_the_schema() {
-    let path = root().join("docs/reference/config.md");
-    let generated = reference::page(&serde_json::from_str(&config::schema()).unwrap());
-    if std::env::var_os("DIMCMC_WRITE_SCHEMA").is_some() {
-        std::fs::write(&path, &generated).unwrap();
+    let of_the_schema = reference::page(&serde_json::from_str(&config::schema()).unwrap());
+    for (name, generated) in [("config.md", of_the_schema), ("instruments.md", reference::instruments())] {
+        let path = root().join("docs/reference").join(name);
+        if std::env::var_os("DIMCMC_WRITE_SCHEMA").is_some() {
+            std::fs::write(&path, &generated).unwrap();
+        }
+        let page = std::fs::read_to_string(&path).unwrap();
+        assert!(page == generated, "{name}: run the tests once with DIMCMC_WRITE_SCHEMA=1");
     }
-    let page = std::fs::read_to_string(&path).unwrap();
-    assert!(page == generated, "run the tests once with DIMCMC_WRITE_SCHEMA=1");
 }
 
 #[test]

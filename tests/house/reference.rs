@@ -1,5 +1,7 @@
-//! The reference of the config, `docs/reference/config.md`, from its JSON Schema: a table for each section.
+//! The reference of the config, `docs/reference/config.md`, from its JSON Schema: a table for each section; and the
+//! spectrographs that it may name, `docs/reference/instruments.md`.
 
+use dimcmc::internals::data::config::SPECTROGRAPHS;
 use serde_json::{Map, Value};
 
 /// Sections in the order in which one thinks of a star; others come after them.
@@ -15,6 +17,7 @@ const UNITS: &[(&str, &str)] = &[
     ("photosphere_k", "K"),
     ("spot_k", "K"),
     ("_nm", "nm"),
+    ("_ms", "m/s"),
     ("_msun", "solar masses"),
     ("phi", "cycles"),
     ("cycles", "cycles"),
@@ -40,6 +43,32 @@ pub fn page(schema: &Value) -> String {
         page.section(name, &sections[name], required);
     }
     page.text
+}
+
+const INSTRUMENTS: &str = "# Spectrographs
+
+`instrument.name` of a [config](config.md#instrument) is one of these, in any case; blanks and hyphens do not matter. It
+gives resolving power R and RV stability where `instrument.resolving_power` and `instrument.stability_ms` are not given.
+`dimcmc init --instrument NAME` also writes the wavelength λ, where `--wavelength` is not given. Any other name takes
+both `instrument.resolving_power` and `instrument.stability_ms`.
+
+R is that of the usual mode; of a slit it depends on its width. λ is a round value of the centre of LSD profiles of cool
+stars; it depends on the line list, and of CRIRES+, PEPSI and UVES on the setting. The RV stability, from night to night
+and without a gas cell, is the standard deviation of the prior of the RV jitter. This page is made from the table in
+`src/data/config/instruments.rs` by a test.
+
+| name | R | λ (nm) | RV stability (m/s) | sources |
+|---|---|---|---|---|
+";
+
+/// The page of the spectrographs.
+pub fn instruments() -> String {
+    let rows = SPECTROGRAPHS.iter().map(|row| {
+        let thousands = row.resolving_power / 1e3;
+        let power = format!("{},{:03}", thousands.floor(), (row.resolving_power % 1e3).round());
+        format!("| {} | {power} | {} | {} | {} |\n", row.name, row.wavelength_nm, row.stability_ms, row.source)
+    });
+    rows.fold(INSTRUMENTS.to_owned(), |page, row| page + &row)
 }
 
 struct Page<'a> {

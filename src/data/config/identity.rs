@@ -5,9 +5,9 @@ use crate::model::{Elements, Parameter};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the star's
-/// name and mass (of a star with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent of the order of
-/// keys.
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the names of
+/// star and spectrograph, the star's mass (with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent
+/// of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -93,6 +93,10 @@ fn decisive(resolved: &Value) -> Value {
             if !has_second_planet(resolved) {
                 star.remove("mass_msun");
             }
+        }
+        // what it gives stands beside it
+        if let Some(instrument) = top.get_mut("instrument").and_then(Value::as_object_mut) {
+            instrument.remove("name");
         }
         if let Some(sampler) = top.get_mut("sampler").and_then(Value::as_object_mut) {
             sampler.retain(|key, _| !["steps", "rhat", "ess"].contains(&key.as_str()));

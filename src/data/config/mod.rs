@@ -4,11 +4,13 @@
 //! A [`Config`] is a `document` of keys. `written` has a type for each section, with its keys, their defaults and what
 //! the schema says of them; `settings` has, in a file of the same name, the checks and what programs use. Defaults that
 //! belong to an algorithm stand beside it. Unknown keys are refused, and every error names the file and the key.
+//! `instruments` has the spectrographs that a config may name.
 
 mod document;
 mod draft;
 mod error;
 mod identity;
+mod instruments;
 mod settings;
 mod written;
 
@@ -17,6 +19,7 @@ pub use document::{Config, from_json, to_text};
 pub use draft::{Draft, Sought};
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
+pub use instruments::{SPECTROGRAPHS, Spectrograph};
 pub use settings::{
     DataSetSettings, FITTED, GridSettings, LightCurveSettings, LightSource, MOST_NODES, ObservationSource, Settings,
 };

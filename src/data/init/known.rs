@@ -34,6 +34,8 @@ pub struct Known {
     /// Half width at half depth of its Lorentzian, which makes it a Voigt profile.
     pub line_gamma_kms: Option<Given<f64>>,
     pub equivalent_width: Option<Given<EquivalentWidth>>,
+    /// Name of the spectrograph, one of [`SPECTROGRAPHS`](crate::data::config::SPECTROGRAPHS).
+    pub instrument_name: Option<Given<&'static str>>,
     pub resolving_power: Option<Given<f64>>,
     pub velocity_range_kms: Option<Given<(f64, f64)>>,
     /// Whether nothing beyond that range is looked at, as an option asks for it; the range of another program's file is

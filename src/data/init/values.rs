@@ -73,7 +73,7 @@ impl Values {
         let resolving_power = ledger.settle(
             ("instrument.resolving_power", ""),
             &known.resolving_power,
-            assume(assumed::RESOLVING_POWER, "--resolving-power"),
+            assume(assumed::RESOLVING_POWER, "--instrument, or --resolving-power"),
         );
         let limb_darkening = ledger.settle(
             ("star.limb_darkening", ""),
@@ -178,7 +178,7 @@ impl Values {
             wavelength_nm: ledger.settle(
                 ("star.wavelength_nm", "nm"),
                 &known.wavelength_nm,
-                assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --wavelength"),
+                assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --instrument, or --wavelength"),
             ),
             contrast: None,
             line: Line {
@@ -197,7 +197,11 @@ impl Values {
             porb_over_prot: porb_over_prot_range,
             vsys_kms: self.vsys_range(vsys_kms, ledger),
         };
-        let instrument = Instrument { resolving_power: Some(self.resolving_power) };
+        let name = known.instrument_name.as_ref().map(|given| {
+            ledger.note("instrument.name", given.value, "", Source::Given, given.by.as_str());
+            given.value.to_owned()
+        });
+        let instrument = Instrument { name, resolving_power: Some(self.resolving_power), stability_ms: None };
         Draft::new(star, instrument, (Vec::new(), light), imaging, sought, porb_over_prot)
     }
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Keys of a config with what they are called, and units.
-const KEYS: [(&str, &str, &str); 24] = [
+const KEYS: [(&str, &str, &str); 25] = [
     ("/star/rotation_period_d", "rotation period", "d"),
     ("/star/epoch_d", "epoch of rotation phase 0", "d"),
     ("/star/inclination_deg", "inclination", "°"),
@@ -24,6 +24,7 @@ const KEYS: [(&str, &str, &str); 24] = [
     ("/star/line/shape", "local line profile", ""),
     ("/star/line/sigma_kms", "standard deviation of the local line", "km/s"),
     ("/star/line/equivalent_width_kms", "equivalent width", "km/s"),
+    ("/instrument/name", "spectrograph", ""),
     ("/instrument/resolving_power", "resolving power", ""),
     ("/observations/sigma_scale", "scale of the uncertainties", ""),
     ("/observations/velocity_jitter_kms", "RV jitter", "km/s"),

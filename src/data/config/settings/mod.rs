@@ -32,7 +32,7 @@ use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
 use photometry::resolve_photometry;
 use simulation::check_plan;
-use star::{fitted_star, resolve_star};
+use star::{fitted_star, resolve_instrument, resolve_star};
 use std::path::{Path, PathBuf};
 
 /// A whole config, resolved.
@@ -42,6 +42,9 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star, whatever data sets say of it.
     pub star: StarSettings,
+    /// RV stability of the spectrograph (km/s): standard deviation of the prior of the RV jitter. `None` where the
+    /// config has neither `instrument.name` nor `instrument.stability_ms`.
+    pub stability_kms: Option<f64>,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
     /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
@@ -69,7 +72,7 @@ pub struct Settings {
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
-    /// `plan`, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// `plan`, names, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change on resuming.
     pub sha256: String,
 }
 
@@ -78,6 +81,7 @@ const FEW_WALKERS: usize = 16;
 
 /// Checks the config that was read from the file at `path`, and fills in its defaults.
 pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Fault> {
+    let stability_kms = resolve_instrument(&mut written.instrument)?;
     let star = resolve_star(&mut written.star, &written.instrument)?;
     let mut values = values(&written, &star)?;
     let size = Size::of(star.rotation_period_d, written.star.vsini_kms, written.star.inclination_deg);
@@ -113,6 +117,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
     Ok(Settings {
         path: path.into(),
         star,
+        stability_kms,
         mass_msun: written.star.mass_msun,
         values,
         sets,

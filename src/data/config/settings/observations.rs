@@ -269,7 +269,8 @@ fn star_of(
         held(Parameter::Contrast, "contrast")?;
         (own.contrast, own.photosphere_k, own.spot_k) = (*contrast, None, None);
     }
-    let instrument = Instrument { resolving_power: resolving_power.or(written.instrument.resolving_power) };
+    let resolution = resolving_power.or(written.instrument.resolving_power);
+    let instrument = Instrument { resolving_power: resolution, ..Instrument::default() };
     if line.is_none() && wavelength_nm.is_none() && contrast.is_none() && resolving_power.is_none() {
         return Ok(star.clone());
     }

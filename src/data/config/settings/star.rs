@@ -1,7 +1,8 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
-use super::checks::{automatic, check_size, most, positive};
+use super::checks::{automatic, check_size, most, positive, within};
 use crate::data::config::error::Fault;
+use crate::data::config::instruments::Spectrograph;
 use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star};
 use crate::model::Parameter;
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
@@ -11,10 +12,17 @@ use std::f64::consts::TAU;
 /// Lightest and heaviest star (solar masses).
 const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
 
-/// Longest name of a star (characters).
+/// Least and largest RV stability of a spectrograph (m/s).
+const STABILITIES_MS: [f64; 2] = [0.0, 1e5];
+
+/// Metres in a kilometre.
+const M_PER_KM: f64 = 1e3;
+
+/// Longest name of a star or a spectrograph (characters).
 const LONGEST_NAME: usize = 80;
 
-fn check_name(name: &str) -> Result<(), Fault> {
+/// The name at `key`, of a star or a spectrograph.
+fn check_name(key: &str, name: &str) -> Result<(), Fault> {
     let length = name.chars().count();
     let problem = match () {
         () if name.trim().is_empty() => "must not be empty".to_owned(),
@@ -22,12 +30,34 @@ fn check_name(name: &str) -> Result<(), Fault> {
         () if length > LONGEST_NAME => format!("has {length} characters, at most {LONGEST_NAME} are allowed"),
         () => return Ok(()),
     };
-    Err(Fault::new("star.name", problem))
+    Err(Fault::new(key, problem))
+}
+
+/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s) where that is known.
+pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<Option<f64>, Fault> {
+    const NAME: &str = "instrument.name";
+    if let Some(name) = &instrument.name {
+        check_name(NAME, name)?;
+        match Spectrograph::named(name) {
+            Some(known) => {
+                instrument.resolving_power.get_or_insert(known.resolving_power);
+                instrument.stability_ms.get_or_insert(known.stability_ms);
+            }
+            None if instrument.resolving_power.is_some() && instrument.stability_ms.is_some() => {}
+            None => {
+                let other = "any other needs instrument.resolving_power and instrument.stability_ms";
+                return Err(Fault::new(NAME, format!("{}; {other}", Spectrograph::unknown(name))));
+            }
+        }
+    }
+    let Some(stability_ms) = instrument.stability_ms else { return Ok(None) };
+    within("instrument.stability_ms", stability_ms, STABILITIES_MS)?;
+    Ok(Some(stability_ms / M_PER_KM))
 }
 
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`.
 pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
-    star.name.as_deref().map_or(Ok(()), check_name)?;
+    star.name.as_deref().map_or(Ok(()), |name| check_name("star.name", name))?;
     positive("star.rotation_period_d", star.rotation_period_d)?;
     check_size("star.rotation_period_d", star.rotation_period_d, most::TIME)?;
     check_size("star.epoch_d", star.epoch_d, most::TIME)?;

@@ -166,8 +166,16 @@ pub enum LimbLaw {
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Instrument {
-    /// Resolving power, above 0: the instrumental profile is a Gaussian of full width c/R at half maximum. Without it,
-    /// no instrumental broadening.
+    /// Name of the spectrograph, in any case, such as "ESPaDOnS", "SPIRou" or "HARPS": it gives `resolving_power` and
+    /// `stability_ms` where these are not given. Any other name takes both. It does not change `star.wavelength_nm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Resolving power, above 0: the instrumental profile is a Gaussian of full width c/R at half maximum. If not
+    /// given, that of the named spectrograph; without a name, no instrumental broadening.
     #[serde(default)]
     pub resolving_power: Option<f64>,
+    /// RV stability (m/s), from 0 to 1e5: standard deviation of the prior of the RV jitter. If not given, that of the
+    /// named spectrograph.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stability_ms: Option<f64>,
 }
