@@ -55,6 +55,8 @@ pub struct WithoutJitter {
     pub here: Linearised,
     /// The jitter that was found (km/s); 0 where none is needed.
     pub found_kms: f64,
+    /// Scale of its prior (km/s), where it has one.
+    pub scale_kms: Option<f64>,
 }
 
 impl WithoutJitter {
@@ -65,7 +67,10 @@ impl WithoutJitter {
 
     /// The same of other velocities of this star.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        if self.found_kms > 0.0 { Jitters::new(quadratic, self.found_kms) } else { Jitters::none(quadratic) }
+        match self.found_kms > 0.0 {
+            true => Jitters::new(quadratic, self.found_kms, self.scale_kms),
+            false => Jitters::none(quadratic),
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::draws::whitening;
 use super::false_alarm::FalseAlarm;
-use super::jitter::Jitters;
+use super::jitter::{Jitters, ln_prior};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
@@ -26,6 +26,7 @@ const DRAWS: usize = 1000;
 /// The velocities of a star without a planet, into which orbits are put.
 pub struct Injections<'a> {
     without: &'a VelocityQuadratic,
+    scale_kms: Option<f64>,
     frequencies: &'a Frequencies,
     settings: SearchSettings,
     probability: f64,
@@ -72,9 +73,10 @@ pub struct Highest {
 }
 
 impl<'a> Injections<'a> {
-    /// Into velocities `without` jitter, orbits of up to `most_kms`; a detection has that false-alarm `probability`.
+    /// Into velocities `without` jitter, that with the prior of `scale_kms`, orbits of up to `most_kms`; a detection has
+    /// that false-alarm `probability`.
     pub fn new(
-        without: &'a VelocityQuadratic,
+        (without, scale_kms): (&'a VelocityQuadratic, Option<f64>),
         most_kms: f64,
         frequencies: &'a Frequencies,
         settings: SearchSettings,
@@ -89,10 +91,10 @@ impl<'a> Injections<'a> {
             kms.push(next);
             next *= STEP;
         }
-        let size = |kms: f64| Size::new(kms, without, (&lambda, &eigen.eigenvectors), frequencies);
+        let size = |kms: f64| Size::new((kms, scale_kms), without, (&lambda, &eigen.eigenvectors), frequencies);
         let sizes = kms.into_iter().map(size).collect();
         let settings = SearchSettings { draws: DRAWS.min(settings.draws), ..settings };
-        Injections { without, frequencies, settings, probability, sizes }
+        Injections { without, scale_kms, frequencies, settings, probability, sizes }
     }
 
     /// Orbits of that period over the rotation period.
@@ -113,7 +115,7 @@ impl<'a> Injections<'a> {
     fn level(&self, size: &Size) -> f64 {
         *size.level.get_or_init(|| {
             let jitters = match size.kms > 0.0 {
-                true => Jitters::new(self.without, size.kms),
+                true => Jitters::new(self.without, size.kms, self.scale_kms),
                 false => Jitters::none(self.without),
             };
             let SearchSettings { draws, seed } = self.settings;
@@ -124,7 +126,7 @@ impl<'a> Injections<'a> {
 
 impl Size {
     fn new(
-        kms: f64,
+        (kms, scale_kms): (f64, Option<f64>),
         without: &VelocityQuadratic,
         (lambda, u): (&DVector<f64>, &DMatrix<f64>),
         all: &Frequencies,
@@ -145,7 +147,7 @@ impl Size {
             frequencies: trials.iter().map(|trial| trial.frequency).collect(),
             rows: columns.transpose(),
             factors,
-            constant: 0.5 * left.map(f64::ln).sum(),
+            constant: 0.5 * left.map(f64::ln).sum() + ln_prior(kms, scale_kms),
             directions: DMatrix::from_diagonal(&left.map(|left| kms * (0.5 * left).sqrt())) * u.transpose(),
             level: OnceLock::new(),
         }
@@ -215,7 +217,7 @@ mod tests {
         let without = sample::correlated(&cycles, &rv, 5);
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
         let settings = SearchSettings { draws: 1000, seed: 1 };
-        let injections = Injections::new(&without, 0.6, &frequencies, settings, 0.01);
+        let injections = Injections::new((&without, None), 0.6, &frequencies, settings, 0.01);
         for (period, k_kms, phi) in [(1.7, 0.0, 0.0), (1.7, 0.3, 0.4), (0.61, 0.6, 0.9)] {
             let found = injections.column(period).highest(k_kms, phi).unwrap();
             let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
@@ -226,7 +228,7 @@ mod tests {
                 // ln L of this size above none, and the best orbit beside it
                 let [none, here] = match size.kms > 0.0 {
                     true => {
-                        let both = Jitters::new(&moved, size.kms);
+                        let both = Jitters::new(&moved, size.kms, None);
                         [0, 4].map(|k| both.levels()[k].clone())
                     }
                     false => [0, 0].map(|k| Jitters::none(&moved).levels()[k].clone()),

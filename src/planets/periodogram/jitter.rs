@@ -16,6 +16,12 @@ const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, s
 /// Directions of the gradient with less than this part of the largest variance do not move.
 const STILL: f64 = 1e-13;
 
+/// ln of the prior of a jitter (km/s) beside that of none: half-Cauchy of that scale (km/s), which lets a jitter be
+/// larger where the profiles ask for it (Gelman 2006, Bayesian Analysis 1, 515). Even without a scale.
+pub fn ln_prior(jitter_kms: f64, scale_kms: Option<f64>) -> f64 {
+    scale_kms.map_or(0.0, |scale| -(jitter_kms / scale).powi(2).ln_1p())
+}
+
 /// ln L of the velocities beside jitters of several sizes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jitters {
@@ -31,7 +37,7 @@ pub struct Level {
     pub size_kms: f64,
     /// ln L of the velocities.
     pub quadratic: VelocityQuadratic,
-    /// ln L at velocities 0, above that of the best size.
+    /// ln L at velocities 0, the prior of the size counted, above that of the best size.
     pub ln_l: f64,
     /// From deviates to the gradient of a star without a planet.
     pub(super) root: DMatrix<f64>,
@@ -73,8 +79,9 @@ impl Jitters {
         Jitters { levels: vec![level], rotation: DMatrix::zeros(0, 0) }
     }
 
-    /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet.
-    pub fn new(without: &VelocityQuadratic, found_kms: f64) -> Self {
+    /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet, with the
+    /// [`ln_prior`] of a scale.
+    pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: Option<f64>) -> Self {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
         let among = |d: DVector<f64>| &u * DMatrix::from_diagonal(&d) * u.transpose();
@@ -84,7 +91,7 @@ impl Jitters {
         let level = |size: f64| {
             let variance = (size * found_kms).powi(2);
             let left = lambda.map(|l| 1.0 / (1.0 + variance * l));
-            let constant = 0.5 * left.map(f64::ln).sum();
+            let constant = 0.5 * left.map(f64::ln).sum() + ln_prior(size * found_kms, scale_kms);
             let information = among(lambda.component_mul(&left));
             Level {
                 size_kms: size * found_kms,
@@ -190,7 +197,7 @@ mod tests {
         let cycles = uneven(n, 4.0);
         let rv = 0.3 * sample::normal(n, 3);
         let without = sample::correlated(&cycles, &rv, 5);
-        let jitters = Jitters::new(&without, 0.2);
+        let jitters = Jitters::new(&without, 0.2, None);
         let covariance = without.information.clone().try_inverse().unwrap();
         let density = |s: f64| {
             let c = &covariance + DMatrix::identity(n, n) * s * s;
@@ -219,7 +226,7 @@ mod tests {
         let found_kms = (rv.norm_squared() / n as f64 - 9e-4).max(0.0).sqrt();
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
         let settings = SearchSettings { draws: 1000, seed: 1 };
-        let found = Search::with_jitter(&Jitters::new(&without, found_kms), &frequencies, settings).unwrap();
+        let found = Search::with_jitter(&Jitters::new(&without, found_kms, None), &frequencies, settings).unwrap();
         found.false_alarm.probability(found.best().orbit.delta_ln_l).value()
     }
 

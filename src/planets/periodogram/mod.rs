@@ -25,7 +25,7 @@ pub use eccentric::KeplerianOrbit;
 pub use false_alarm::FalseAlarm;
 pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
 pub use injections::Injections;
-pub use jitter::Jitters;
+pub use jitter::{Jitters, ln_prior};
 pub use orbits::{CircularOrbit, Trial};
 pub use peaks::Peak;
 pub use rotation::{Imitation, RotationPeriods};

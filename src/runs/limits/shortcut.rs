@@ -141,7 +141,8 @@ impl<'a> Shortcut<'a> {
     pub fn searches(&self, most_kms: f64) -> Searches<'_> {
         let LimitSettings { detection, frequencies, .. } = self.settings;
         let injections = self.without_jitter.as_ref().map(|without| {
-            Injections::new(&without.here.quadratic, most_kms, frequencies, detection.search, CANDIDATE_FAP)
+            let velocities = (&without.here.quadratic, without.scale_kms);
+            Injections::new(velocities, most_kms, frequencies, detection.search, CANDIDATE_FAP)
         });
         Searches { shortcut: self, injections }
     }

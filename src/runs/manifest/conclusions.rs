@@ -129,7 +129,8 @@ impl RunSummary {
             Some(search) => {
                 let remarks = summary.of_the_planet(settings, search);
                 let verdict = search.verdict.clone().with(&remarks);
-                summary.verdict = Some(verdict.with_periods(shares(&summary.period_modes, rotation_period_d)));
+                summary.verdict =
+                    Some(verdict.with_periods(shares(&summary.period_modes, settings.star.rotation_period_d)));
                 let all = search.remarks.iter().chain(&remarks).map(|remark| &remark.text);
                 summary.remarks = all.filter(|text| !text.is_empty()).cloned().collect();
             }

@@ -233,7 +233,7 @@ fn with_or_without_jitter(
     let Ok(other) = at(Assumed { jitter_kms, ..assumed }, Some(&fitted.marginal)) else { return Ok(fitted) };
     // without one it is simpler
     let needed = if jitter_kms == 0.0 { -GAIN } else { GAIN };
-    if other.ln_evidence() < fitted.marginal.ln_evidence() + needed {
+    if known.height(&other) < known.height(&fitted.marginal) + needed {
         return Ok(fitted);
     }
     climb(other, known, None, at)

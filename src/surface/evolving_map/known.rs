@@ -3,6 +3,7 @@
 use super::{Assumed, Marginal};
 use crate::field::{Field, Lifetime, Spectrum};
 use crate::model::{Parameter, Prior};
+use crate::planets::periodogram::ln_prior;
 use serde::{Deserialize, Serialize};
 
 /// Bounds of amplitude, slope and lifetime (d).
@@ -34,6 +35,9 @@ pub struct Known {
     pub lifetime: Option<Lifetime>,
     /// Velocity jitter (km/s).
     pub jitter_kms: Option<f64>,
+    /// Scale of the half-Cauchy prior of the jitter (km/s), where it is fitted: the stability of the spectrograph.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jitter_scale_kms: Option<f64>,
     /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
     /// in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
@@ -49,6 +53,7 @@ impl Known {
             break_degree: Some(field.spectrum.break_degree),
             lifetime: Some(field.kernel.lifetime),
             jitter_kms: Some(jitter_kms),
+            jitter_scale_kms: None,
             priors: [None; 3],
         }
     }
@@ -93,7 +98,11 @@ impl Known {
             None if self.amplitude.is_none() => -0.5 * (spectrum.amplitude / LARGEST_AMPLITUDE).powi(2),
             _ => 0.0,
         };
-        (0..3).filter_map(of).sum::<f64>() + usual
+        let jitter = match self.jitter_kms {
+            None => ln_prior(assumed.jitter_kms, self.jitter_scale_kms),
+            Some(_) => 0.0,
+        };
+        (0..3).filter_map(of).sum::<f64>() + usual + jitter
     }
 
     /// What is maximised: ln Z, and what is known of the field beforehand.

@@ -63,18 +63,18 @@ impl SurfaceModel for EvolvingMap {
 
     fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError> {
         let fitted = here.kept::<Fitted>();
-        let found_kms = fitted.marginal.assumed.jitter_kms;
+        let (found_kms, scale_kms) = (fitted.marginal.assumed.jitter_kms, self.known.jitter_scale_kms);
         if self.known.jitter_kms.is_some() {
             return Ok(None);
         }
         if found_kms <= 0.0 {
-            return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0 }));
+            return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0, scale_kms }));
         }
         let basis = Basis::new(&at.imager.grid);
         let marginal = fitted.marginal.without_jitter(at.imager, &basis)?;
         let without = linearised((at.imager, &basis), Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
         let here = Linearised { field: here.field.clone(), ..without };
-        Ok(Some(WithoutJitter { here, found_kms }))
+        Ok(Some(WithoutJitter { here, found_kms, scale_kms }))
     }
 
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel> {

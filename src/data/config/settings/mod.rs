@@ -35,6 +35,12 @@ use simulation::check_plan;
 use star::{fitted_star, resolve_instrument, resolve_star};
 use std::path::{Path, PathBuf};
 
+/// RV stability of a spectrograph of which nothing is known (km/s): that of ESPaDOnS and NARVAL (`instruments`).
+const USUAL_STABILITY_KMS: f64 = 0.03;
+
+/// A stability is no better than this (km/s).
+const BEST_STABILITY_KMS: f64 = 1e-4;
+
 /// A whole config, resolved.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -42,8 +48,8 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star, whatever data sets say of it.
     pub star: StarSettings,
-    /// RV stability of the spectrograph (km/s): standard deviation of the prior of the RV jitter. `None` where the
-    /// config has neither `instrument.name` nor `instrument.stability_ms`.
+    /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter. `None` where the config
+    /// has neither `instrument.name` nor `instrument.stability_ms`.
     pub stability_kms: Option<f64>,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
@@ -330,6 +336,7 @@ impl Settings {
             },
             priors,
             jitter_kms: self.velocity_jitter.number(),
+            jitter_scale_kms: Some(self.stability_kms.unwrap_or(USUAL_STABILITY_KMS).max(BEST_STABILITY_KMS)),
         }
     }
 
