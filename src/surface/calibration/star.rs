@@ -99,7 +99,7 @@ impl MeasuredStar {
         };
         let priors: Vec<StarPrior> = fitted.iter().map(|parameter| prior(*parameter, value(*parameter))).collect();
         let FittedStar { values, sd, mean_profile, ln_evidence, ln_prior, assumed } =
-            fit_star(imager, plain, known, &priors)?;
+            fit_star(imager, plain, known, &priors, NEEDED)?;
         let told: f64 = sd.iter().zip(&priors).map(|(sd, prior)| (sd / prior.sd).min(1.0).ln()).sum();
         let gain = ln_evidence - plain.ln_evidence;
         if gain + ln_prior + told < NEEDED {

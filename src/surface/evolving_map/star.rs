@@ -22,6 +22,9 @@ const DEGREE: usize = 18;
 const GAIN: f64 = 1.0;
 const STEPS: usize = 12;
 
+/// So many steps with all profiles follow those with a share of them.
+const LAST_STEPS: usize = 3;
+
 /// Numbers of a climb that are not the star's: ln amplitude, slope, ln lifetime and ln jitter of the field, ln size of
 /// what is wrong alike in all profiles.
 const OF_FIELD: usize = 5;
@@ -114,11 +117,18 @@ pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> R
 }
 
 /// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
-/// first those of the line, if there are any, then all with a share of the profiles, then with all of them.
+/// first those of the line, if there are any, then all with a share of the profiles, then with all of them. Where the
+/// share says that they gain less than `needed` in ln Z and ln of their prior, it stays at what it says.
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPrior]) -> Result<FittedStar, FieldError> {
+pub fn fit_star(
+    imager: &Imager,
+    near: &Fitted,
+    known: &Known,
+    priors: &[StarPrior],
+    needed: f64,
+) -> Result<FittedStar, FieldError> {
     let assumed = near.marginal.assumed;
     let few = share_of(imager);
     let climb = Climb::new(few.as_ref().unwrap_or(imager), known, &assumed, priors);
@@ -129,6 +139,7 @@ pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPri
         let design = Arc::new(Design::new(climb.imager, &climb.basis, &values.state()));
         start = Marginal::new(climb.imager, &climb.basis, design, values, assumed, None)?;
     }
+    let plain = start.ln_evidence();
     let mut place = climb.start(&assumed, &start.values);
     if of_line > 0 && of_line < priors.len() {
         let line = Climb::new(climb.imager, known, &assumed, &priors[..of_line]);
@@ -142,6 +153,11 @@ pub fn fit_star(imager: &Imager, near: &Fitted, known: &Known, priors: &[StarPri
         return Ok(climb.fitted(&top));
     }
     let more = imager.profiles().count() as f64 / climb.imager.profiles().count() as f64;
+    let by_few = climb.fitted(&top);
+    let gain = more * (by_few.ln_evidence - plain);
+    if gain + by_few.ln_prior < needed {
+        return Ok(FittedStar { ln_evidence: near.ln_evidence + gain, ..by_few });
+    }
     let of_field = top.of_field.map(|along| along * more);
     let climb = Climb { imager, ..climb };
     let top = climb.up(climb.condensed_at(&top.point.place, &near.marginal, None)?, Some(of_field))?;
@@ -353,11 +369,12 @@ impl<'a> Climb<'a> {
         let count = self.limits.len();
         let mut bend = self.with_field(&here, &of_field.unwrap_or([USUAL_BEND; OF_FIELD]))?;
         let (mut gradient, along) = self.gradient(&here, &bend, of_field.is_none());
+        let steps = if of_field.is_some() { LAST_STEPS } else { STEPS };
         let of_field = of_field.unwrap_or(std::array::from_fn(|i| along[i].max(LEAST_BEND)));
         let mut damping = DAMPING;
         bend = self.with_field(&here, &of_field)?;
         let mut learnt = false;
-        for _ in 0..STEPS {
+        for _ in 0..steps {
             let pushes = |i: usize| {
                 let (low, high) = self.limits[i];
                 (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
