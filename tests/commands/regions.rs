@@ -114,3 +114,50 @@ fn a_drift_is_told_with_its_error() {
     let [slope, sigma] = ["kms_d", "sigma_kms_d"].map(|key| drift[key].as_f64().unwrap());
     assert!((slope - 0.02).abs() < 3.0 * sigma && sigma < 0.005, "{drift}");
 }
+
+/// Two profiles with a weaker line and a bump are found and named, all others keep their errors, and a list by hand
+/// has the last word.
+#[test]
+fn flares_are_found_and_no_others() {
+    let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
+    config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
+    let list = desk.read("data/observations.txt");
+    let files: Vec<(String, f64)> = (list.lines().filter(|line| !line.starts_with('#')))
+        .map(|line| {
+            let mut words = line.split_whitespace();
+            (words.next().unwrap().to_owned(), words.next().unwrap().parse().unwrap())
+        })
+        .collect();
+    for k in [6, 15] {
+        let path = format!("data/{}", files[k].0);
+        desk.write(&path, &with_flare(&desk.read(&path)));
+    }
+    let mut found = |events: Value| {
+        config["observations"]["events"] = events;
+        desk.write(CONFIG, &config.to_string());
+        let said = desk.succeed(&["map", CONFIG, "--out", "map", "--force"]);
+        let measured = desk.json("map/fit.json")["measured"].clone();
+        let named = measured["events"]["profiles"].as_array().cloned().unwrap_or_default();
+        assert_eq!(said.contains("events"), !named.is_empty(), "{said}");
+        named.iter().map(|event| event["profile"].as_u64().unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(found(json!("fitted")), [7, 16]);
+    assert!(found(json!("none")).is_empty());
+    let at = |k: usize| json!([[files[k].1 - 1e-3, files[k].1 + 1e-3]]);
+    assert_eq!(found(json!({ "exclude": at(6), "include": at(2) })), [3, 16]);
+}
+
+/// A table of velocity, intensity and error with a line that is 6 % weaker and a bump.
+fn with_flare(profile: &str) -> String {
+    let changed = |line: &str| {
+        let numbers: Option<Vec<f64>> = line.split_whitespace().map(|word| word.parse().ok()).collect();
+        match numbers.filter(|numbers| numbers.len() >= 3) {
+            Some(mut numbers) => {
+                numbers[1] = 1.0 - 0.94 * (1.0 - numbers[1]) + 0.01 * (-0.5 * ((numbers[0] - 9.0) / 4.0).powi(2)).exp();
+                numbers.iter().map(|x| format!("{x:.7}")).collect::<Vec<_>>().join(" ")
+            }
+            None => line.to_owned(),
+        }
+    };
+    profile.lines().map(changed).collect::<Vec<_>>().join("\n") + "\n"
+}
