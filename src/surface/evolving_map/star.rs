@@ -44,6 +44,9 @@ const FEW: usize = 24;
 /// Longest step in a coordinate.
 const LONGEST: f64 = 1.0;
 
+/// Largest amplitude of the spots where a climb begins.
+const MOST_AT_FIRST: f64 = 0.3;
+
 /// Damping of the first step, and where no step leads up.
 const DAMPING: f64 = 0.05;
 const MOST_DAMPING: f64 = 1e3;
@@ -223,7 +226,11 @@ impl<'a> Climb<'a> {
         let area = area.map(|prior| prior.start).or(values.get(Parameter::RegionArea)).unwrap_or(1.0);
         let of_star = self.priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
         let size: f64 = if self.free[SIZE] { MEAN_PROFILE } else { 0.0 };
-        let of_field = place_of_field(assumed);
+        let mut of_field = place_of_field(assumed);
+        // more spots than usual stand in for what is to be found
+        if self.known.amplitude.is_none() {
+            of_field[0] = of_field[0].min(MOST_AT_FIRST.ln()).max(self.limits[0].0);
+        }
         let all = of_field.iter().copied().chain([size.ln()]).chain(of_star);
         DVector::from_iterator(OF_FIELD + self.priors.len(), all)
     }
