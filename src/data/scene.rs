@@ -14,11 +14,9 @@ use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::{Observations, Profile};
-use crate::surface::calibration::events::Events;
+use crate::surface::calibration;
+use crate::surface::calibration::events::{ByHand, Events};
 use crate::surface::calibration::star::MeasuredStar;
-use crate::surface::evolving_map::events::ByHand;
-use crate::surface::evolving_map::star::coarsely;
-use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, NoMaps, SurfaceMaps, SurfaceSettings};
@@ -123,45 +121,14 @@ impl Scene {
         if !is_open || self.measured.star.is_some() || self.measured.events.is_some() {
             return self;
         }
-        match self.found(&fitted, by_hand.as_deref(), report) {
-            Ok(found) => self.with_found(&found),
+        let (known, values) = (self.settings.known_field(), self.settings.values);
+        match calibration::found(&self.imager, values, &known, (&fitted, by_hand.as_deref()), report) {
+            Ok((star, events)) => self.with_found(&Measured { star, events, ..Measured::default() }),
             Err(error) => {
                 self.measured.profiles.push(format!("regions, line and events were not fitted: {error}"));
                 self
             }
         }
-    }
-
-    /// What the profiles say of star and events. Flares would be taken for regions, and regions for flares: events are
-    /// found with plain spots first, and anew with the star that is found without them.
-    fn found(
-        &self,
-        fitted: &[Parameter],
-        by_hand: Option<&[ByHand]>,
-        report: &dyn Fn(&str),
-    ) -> Result<Measured, NoFit> {
-        let (known, values) = (self.settings.known_field(), self.settings.values);
-        let events = |imager: &Imager, near: Assumed| {
-            report("looking for flares and other events");
-            by_hand.map(|by_hand| Events::of(imager, values, &known, near, by_hand)).transpose()
-        };
-        report("fitting active regions");
-        let mut imager = self.imager.clone();
-        let mut plain = coarsely(&imager, values, known)?;
-        let first = events(&imager, plain.marginal.assumed)?;
-        if fitted.is_empty() {
-            return Ok(Measured { events: first, ..Measured::default() });
-        }
-        if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
-            imager = imager.with_larger_errors(&first.factors(self.observations.profiles.len()));
-            plain = coarsely(&imager, values, known)?;
-        }
-        report("fitting active regions");
-        let (star, near) = MeasuredStar::of(&imager, &plain, &known, fitted)?;
-        let mut imager = self.imager.clone();
-        star.put_into(&mut imager);
-        let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-        Ok(Measured { star: Some(star), events, ..Measured::default() })
     }
 
     /// What is known of events among the profiles; `None` where they are not looked for.

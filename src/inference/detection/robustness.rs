@@ -11,6 +11,7 @@ use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, AtTarget};
+use nalgebra::DVector;
 
 /// Profiles further apart than this (d) belong to different nights.
 const NIGHT_GAP_D: f64 = 0.3;
@@ -101,7 +102,9 @@ pub fn robustness(
     let held_out = |of_others: Option<CircularOrbit>| {
         let CircularOrbit { k_kms, phi, delta_ln_l, .. } = of_others?;
         let orbit = Orbit { k_kms, porb_over_prot: peak.porb_over_prot, phi };
-        Some(of_all.delta_ln_l(&orbit) - delta_ln_l)
+        let cycles = &star.quadratic.cycles;
+        let velocities = DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles));
+        Some(of_all.delta_ln_l(&velocities) - delta_ln_l)
     };
     let without = without.into_iter().zip(heights);
     let without = without.map(|(orbit, blind)| (with_height(orbit, blind), held_out(blind)));

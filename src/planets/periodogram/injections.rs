@@ -73,7 +73,7 @@ pub struct Highest {
 }
 
 impl<'a> Injections<'a> {
-    /// Into velocities `without` jitter, that with the prior of `scale_kms`, orbits of up to `most_kms`; a detection has
+    /// Into velocities `without` jitter, whose prior has that scale, orbits of up to `most_kms`; a detection has
     /// that false-alarm `probability`.
     pub fn new(
         (without, scale_kms): (&'a VelocityQuadratic, Option<f64>),

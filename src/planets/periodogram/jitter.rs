@@ -7,7 +7,6 @@
 
 use super::orbits::{CircularOrbit, Trial, scan};
 use crate::planets::velocities::VelocityQuadratic;
-use crate::star::Orbit;
 use nalgebra::{DMatrix, DVector};
 
 /// Sizes that are tried, of the one found without a planet.
@@ -134,13 +133,10 @@ impl Jitters {
         self.scan(&[frequency])[0].trial_above_no_planet().orbit
     }
 
-    /// Height of an orbit beside the jitter that suits it best above no planet beside the jitter that suits this best.
-    pub fn delta_ln_l(&self, orbit: &Orbit) -> f64 {
-        let height = |level: &Level| {
-            let quadratic = &level.quadratic;
-            let velocities = DVector::from_iterator(quadratic.len(), orbit.velocities_kms(&quadratic.cycles));
-            level.ln_l + quadratic.log_likelihood(&velocities)
-        };
+    /// Height of an orbit of these velocities (km/s) beside the jitter that suits it best above no planet beside the
+    /// jitter that suits this best.
+    pub fn delta_ln_l(&self, velocities: &DVector<f64>) -> f64 {
+        let height = |level: &Level| level.ln_l + level.quadratic.log_likelihood(velocities);
         self.levels.iter().map(height).fold(f64::NEG_INFINITY, f64::max)
     }
 

@@ -2,10 +2,12 @@
 
 use crate::model::ParameterValues;
 use crate::surface::Known;
-use crate::surface::evolving_map::events::{ByHand, Unpredicted, events};
+use crate::surface::evolving_map::events::{Unpredicted, events};
 use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
+
+pub use crate::surface::evolving_map::events::ByHand;
 
 /// More than this share of the profiles are not events: the model is wrong, or the errors are.
 const MOST: f64 = 1.0 / 3.0;

@@ -9,3 +9,47 @@ pub mod noise;
 pub mod offsets;
 pub mod star;
 pub mod target;
+
+use crate::model::{Parameter, ParameterValues};
+use crate::surface::Known;
+use crate::surface::evolving_map::star::coarsely;
+use crate::surface::evolving_map::{Assumed, NoFit};
+use crate::surface::imaging::Imager;
+use events::{ByHand, Events};
+use star::MeasuredStar;
+
+/// What the profiles say of the numbers of the star that are `fitted`, and of events, where these are looked for.
+/// Flares would be taken for regions, and regions for flares: events are found with plain spots first, and anew with
+/// the star that is found without them. `report` is told what is under way.
+///
+/// # Errors
+/// [`NoFit`].
+pub fn found(
+    imager: &Imager,
+    values: ParameterValues,
+    known: &Known,
+    (fitted, by_hand): (&[Parameter], Option<&[ByHand]>),
+    report: &dyn Fn(&str),
+) -> Result<(Option<MeasuredStar>, Option<Events>), NoFit> {
+    let events = |imager: &Imager, near: Assumed| {
+        report("looking for flares and other events");
+        by_hand.map(|by_hand| Events::of(imager, values, known, near, by_hand)).transpose()
+    };
+    report("fitting active regions");
+    let mut plain = coarsely(imager, values, *known)?;
+    let first = events(imager, plain.marginal.assumed)?;
+    if fitted.is_empty() {
+        return Ok((None, first));
+    }
+    let mut without = imager.clone();
+    if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
+        without = imager.with_larger_errors(&first.factors(imager.profiles().count()));
+        plain = coarsely(&without, values, *known)?;
+    }
+    report("fitting active regions");
+    let (star, near) = MeasuredStar::of(&without, &plain, known, fitted)?;
+    let mut imager = imager.clone();
+    star.put_into(&mut imager);
+    let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
+    Ok((Some(star), events))
+}

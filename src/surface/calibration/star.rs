@@ -77,8 +77,8 @@ pub struct MeasuredStar {
 }
 
 impl MeasuredStar {
-    /// Of the profiles of `imager`, the other parameters at `values`, without a planet, from a field like that of `plain`
-    /// spots there; and the field that goes with it.
+    /// Of the profiles of `imager`, the other parameters as those of `plain` spots, from the field of these; and the
+    /// field that goes with it.
     ///
     /// # Errors
     /// [`NoFit`].

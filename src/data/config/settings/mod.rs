@@ -48,8 +48,8 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star, whatever data sets say of it.
     pub star: StarSettings,
-    /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter. `None` where the config
-    /// has neither `instrument.name` nor `instrument.stability_ms`.
+    /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter. `None` where the
+    /// config has neither `instrument.name` nor `instrument.stability_ms`.
     pub stability_kms: Option<f64>,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
