@@ -125,7 +125,7 @@ impl Scene {
         match calibration::found(&self.imager, values, &known, (&fitted, by_hand.as_deref()), report) {
             Ok((star, events)) => self.with_found(&Measured { star, events, ..Measured::default() }),
             Err(error) => {
-                self.measured.profiles.push(format!("regions, line and events were not fitted: {error}"));
+                self.measured.profiles.push(format!("star and outliers not fitted: {error}"));
                 self
             }
         }

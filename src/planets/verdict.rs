@@ -17,7 +17,7 @@ pub const DETECTION_FAP: f64 = 1e-3;
 pub const UNAMBIGUOUS: f64 = 0.95;
 
 /// Periods of a smaller share are not told.
-const LEAST_SHARE: f64 = 0.02;
+pub const LEAST_SHARE: f64 = 0.02;
 const MOST_PERIODS: usize = 4;
 
 /// What the profiles say of a planet.
@@ -194,20 +194,18 @@ impl Verdict {
         }
     }
 
-    /// The same of a period that has these posterior shares (in any order, summing to 1 or less): a planet may be
-    /// detected while its period is not.
+    /// The same of a period that has these posterior shares (in any order, summing to 1 or less), in place of those that
+    /// it had: a planet may be detected while its period is not.
     pub fn with_periods(mut self, mut shares: Vec<PeriodShare>) -> Self {
+        let (None, Some(probability), Some(signal)) = (self.known, self.false_alarm_probability, self.signal) else {
+            return self;
+        };
         shares.sort_by(|a, b| b.share.total_cmp(&a.share));
         let is_clear = shares.first().is_none_or(|first| first.share > UNAMBIGUOUS);
         shares.retain(|of| of.share >= LEAST_SHARE);
         shares.truncate(MOST_PERIODS);
-        if is_clear || self.known.is_some() || shares.len() < 2 {
-            return self;
-        }
-        self.periods = shares;
-        if let (Some(probability), Some(signal)) = (self.false_alarm_probability, self.signal) {
-            self.sentence = sentence(self.finding, probability, &signal, &self.against, &self.periods);
-        }
+        self.periods = if is_clear || shares.len() < 2 { Vec::new() } else { shares };
+        self.sentence = sentence(self.finding, probability, &signal, &self.against, &self.periods);
         self
     }
 
@@ -362,6 +360,8 @@ mod tests {
         assert!(less.sentence.starts_with("Candidate, period ambiguous: 0.831 d (58 %)"), "{}", less.sentence);
         let clear = of(vec![share(4.93, 0.97), share(0.831, 0.03)]);
         assert!(clear.periods.is_empty() && clear.sentence.starts_with("Detection: "), "{}", clear.sentence);
+        let settled = less.with_periods(vec![share(4.93, 0.97), share(0.831, 0.03)]);
+        assert!(settled.periods.is_empty() && !settled.sentence.contains("ambiguous"), "{}", settled.sentence);
         let none = Verdict::new(0.5, SIGNAL, &[]).with_periods(vec![share(4.93, 0.5), share(0.831, 0.5)]);
         assert!(!none.sentence.contains("ambiguous"), "{}", none.sentence);
     }

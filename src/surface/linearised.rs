@@ -118,11 +118,11 @@ impl SpotField {
         let amplitude = self.spot_amplitude;
         (amplitude > LARGEST_AMPLITUDE).then(|| {
             let text = format!(
-                "spot_amplitude is {amplitude:.2}, more than a star can have: spots stand in for something else. \
-                Likely causes: star.line, star.vsini_kms, star.vsys_kms (let star.fitted name them), or \
+                "spot_amplitude = {amplitude:.2} is implausibly large: spots mimic an error of the model. Likely \
+                causes: star.line, star.vsini_kms or star.vsys_kms (fit them: star.fitted), or \
                 observations.sigma_scale"
             );
-            Remark::against("more spots than a star can have", text)
+            Remark::against("implausible spot amplitude", text)
         })
     }
 

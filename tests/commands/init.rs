@@ -298,13 +298,21 @@ fn a_line_that_is_wrong_is_put_right_or_named() {
     let desk = desk();
     let wrong = ["--line-sigma", "9", "--vsini", "25"];
     let table = desk.succeed(&[&INIT[..], &wrong].concat());
-    says(&table, &["star.fitted", "note: test fit: evolving maps fit", "note: fitted star: line sigma "]);
+    says(
+        &table,
+        &[
+            "star.fitted",
+            "line_sigma_kms, equivalent_width_kms",
+            "note: test fit: evolving maps fit",
+            "note: fitted star: line sigma ",
+        ],
+    );
     let mut config = desk.json("star.json");
     assert_eq!(config["star"]["fitted"].as_array().unwrap().len(), 4);
     config["star"].as_object_mut().unwrap().remove("fitted");
     desk.write("star.json", &config.to_string());
     let said = desk.succeed(&["map", "star.json", "--out", "map"]);
-    says(&said, &["more than a star can have", "likely cause: the width of the local line"]);
+    says(&said, &["implausibly large", "likely cause: the width of the local line"]);
 }
 
 /// Profiles that end where the line does: their continuum is seen at their ends alone.

@@ -88,6 +88,15 @@ fn keys_that_make_no_sense_are_refused() {
     refused("fitted", json!(["period"]), evolving, &["star.fitted: \"period\" is none of \"line_sigma_kms\""]);
     refused("fitted", json!(["vsini_kms", "vsini_kms"]), evolving, &["star.fitted: \"vsini_kms\" is there twice"]);
     refused("velocity_drift", json!("linear"), "spottedness", &["star.velocity_drift: no effect but with"]);
+    let refused = |events: Value, objective: &str, expected: &str| {
+        let mut config = sampled();
+        config["observations"]["events"] = events;
+        config["imaging"] = json!({ "pixels": 200, "objective": objective });
+        says(&Desk::new(config).refusal(&["map", CONFIG, "--out", "map"]), &[expected]);
+    };
+    refused(json!("some"), evolving, "observations.events: must be \"fitted\", \"none\", or windows of time");
+    refused(json!({ "include": [[3, 2]] }), evolving, "observations.events.include[0]: the start 3 must be before");
+    refused(json!("fitted"), "spottedness", "observations.events: no effect but with imaging.objective");
 }
 
 /// A drift is told with its error, and is no planet at the edge of the search.

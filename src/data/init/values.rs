@@ -413,8 +413,8 @@ fn fitted(data_sets: usize, known: &Known, ledger: &mut Ledger) -> Vec<String> {
     let common = |parameter: &&Parameter| matches!(parameter, Parameter::LineSigma | Parameter::Vsini);
     let names = FITTED.iter().filter(|parameter| data_sets == 1 || common(parameter));
     let names: Vec<String> = names.map(|parameter| parameter.name().to_owned()).collect();
-    let remark = "fitted by every command, under priors around the values above and below";
-    ledger.note("star.fitted", format!("{} numbers", names.len()), "", Source::Assumed, remark);
+    let remark = format!("{}; prior means as listed", names.join(", "));
+    ledger.note("star.fitted", format!("{} parameters", names.len()), "", Source::Assumed, remark);
     names
 }
 

@@ -6,7 +6,7 @@ use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::posterior_shares;
-use crate::planets::verdict::{CANDIDATE_FAP, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
+use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
 use crate::surface::imaging::Imager;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
@@ -14,9 +14,6 @@ const FEW: usize = 12;
 
 /// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
 const OFFSET_GAIN: f64 = 12.5;
-
-/// A peak of a smaller posterior share than this is no rival.
-const RIVAL: f64 = 0.03;
 
 /// Other peaks that may be the true one, as many as are named.
 const RIVALS_NAMED: usize = 3;
@@ -192,7 +189,7 @@ impl Detection {
             return Vec::new();
         }
         let mut rivals: Vec<(&Peak, f64)> = peaks.into_iter().zip(shares).skip(1).collect();
-        rivals.retain(|(_, share)| *share >= RIVAL);
+        rivals.retain(|(_, share)| *share >= LEAST_SHARE);
         rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
         rivals
     }
@@ -217,13 +214,12 @@ impl Detection {
                 format!("K shifts by {errors:.1}σ when imaging.chi2_target changes by 3 %: quote the range."),
             ));
         }
-        if let Some(held) = robustness.held_out().filter(|held| self.is_candidate() && held.sum < 0.0) {
+        if let Some(held) = robustness.held_out().filter(|held| self.is_candidate() && held.delta_ln_p < 0.0) {
             remarks.push(Remark::against(
-                "held-out nights are not predicted better",
+                "held-out nights not predicted better",
                 format!(
-                    "Each night, predicted by all others, is no more probable with the planet: Δln p = {:.1} ± {:.1} \
-                    over {} nights.",
-                    held.sum, held.scatter, held.nights
+                    "The planet does not improve the prediction of held-out nights: Δln p = {:.1} ± {:.1} ({} nights).",
+                    held.delta_ln_p, held.sigma_delta_ln_p, held.nights
                 ),
             ));
         }

@@ -12,6 +12,7 @@ use crate::star::Orbit;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, AtTarget};
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 /// Profiles further apart than this (d) belong to different nights.
 const NIGHT_GAP_D: f64 = 0.3;
@@ -40,12 +41,12 @@ pub struct WithoutNight {
 }
 
 /// Whether nights that are held out are predicted better with the planet.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
-    /// Sum of the Delta ln p of all nights.
-    pub sum: f64,
-    /// Standard deviation of the sum, by the scatter of the nights.
-    pub scatter: f64,
+    /// Sum of the Delta ln p of all nights; above 0 where the planet predicts them better.
+    pub delta_ln_p: f64,
+    /// Its standard deviation, by the scatter of the nights.
+    pub sigma_delta_ln_p: f64,
     /// Number of nights.
     pub nights: usize,
 }
@@ -140,7 +141,8 @@ impl Robustness {
         let (nights, sum) = (all.len(), all.iter().sum::<f64>());
         let mean = sum / nights as f64;
         let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (nights as f64 - 1.0);
-        (nights > 1).then(|| HeldOut { sum, scatter: (nights as f64 * variance).sqrt(), nights })
+        let sigma_delta_ln_p = (nights as f64 * variance).sqrt();
+        (nights > 1).then_some(HeldOut { delta_ln_p: sum, sigma_delta_ln_p, nights })
     }
 
     /// By how many of its errors K differs between targets, where that is worth a warning.
@@ -194,7 +196,7 @@ mod tests {
             night(None),
         ];
         let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets: vec![at(0.205), at(0.2), at(0.192)], nights };
-        assert_eq!(steady.held_out(), Some(HeldOut { sum: 4.0, scatter: 0.0, nights: 4 }));
+        assert_eq!(steady.held_out(), Some(HeldOut { delta_ln_p: 4.0, sigma_delta_ln_p: 0.0, nights: 4 }));
         assert_eq!(steady.target_matters(), None);
         let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();
         assert_eq!(decisive, vec![orbit(0.2, 0.03, 7.0), orbit(0.27, 0.0225, 15.0), None]);

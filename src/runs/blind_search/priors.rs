@@ -27,6 +27,7 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
             verdict = highest(&periods, found, remarks);
         }
     }
+    verdict = verdict.with_periods(found.shares(&|ratio| periods.contain(ratio)));
     let prior = scene.settings.free.iter().find(|f| f.parameter == Parameter::K).map(|f| f.prior);
     if let Some((Signal { k_kms, .. }, prior)) = verdict.signal.zip(prior).filter(|(s, prior)| !prior.contains(s.k_kms))
     {
@@ -84,5 +85,4 @@ fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict 
     let CircularOrbit { k_kms, sigma_k_kms, delta_ln_l, .. } = orbit;
     let signal = Signal { period_d: rotation_period_d * porb_over_prot, sigma_period_d, k_kms, sigma_k_kms };
     Verdict::new(found.blind.false_alarm.probability(delta_ln_l).value(), signal, &remarks)
-        .with_periods(found.shares(&|ratio| periods.contain(ratio)))
 }

@@ -269,24 +269,7 @@ pub struct RobustnessRecord {
     pub without_night: Vec<NightRecord>,
     /// The sum over them of what the planet adds to their prediction; null for less than two nights.
     #[serde(default)]
-    pub held_out_nights: Option<HeldOutRecord>,
-}
-
-/// Whether nights that are held out are predicted better with the planet.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HeldOutRecord {
-    /// Sum of `delta_ln_p` of all nights; above 0 where the planet predicts them better.
-    pub delta_ln_p: f64,
-    /// Its standard deviation, by the scatter of the nights.
-    pub sigma_delta_ln_p: f64,
-    /// Number of nights.
-    pub nights: usize,
-}
-
-impl From<HeldOut> for HeldOutRecord {
-    fn from(HeldOut { sum, scatter, nights }: HeldOut) -> Self {
-        HeldOutRecord { delta_ln_p: sum, sigma_delta_ln_p: scatter, nights }
-    }
+    pub held_out_nights: Option<HeldOut>,
 }
 
 /// The orbit at the best period with another target chi2.
@@ -493,7 +476,7 @@ impl RobustnessRecord {
             delta_ln_p: night.delta_ln_p,
         };
         RobustnessRecord {
-            held_out_nights: found.held_out().map(HeldOutRecord::from),
+            held_out_nights: found.held_out(),
             targets: found.targets.iter().map(target).collect(),
             without_night: found.nights.iter().map(night).collect(),
         }

@@ -3,9 +3,10 @@
 
 use super::quantities::QuantitiesRecord;
 use super::record::{
-    FalseAlarmRecord, HeldOutRecord, KeplerianRecord, NightRecord, OrbitRecord, PeakRecord, PeriodogramFile,
-    QuickRecord, RobustnessRecord,
+    FalseAlarmRecord, KeplerianRecord, NightRecord, OrbitRecord, PeakRecord, PeriodogramFile, QuickRecord,
+    RobustnessRecord,
 };
+use crate::inference::detection::HeldOut;
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
 use crate::planets::verdict::{SIMULATED_FAP, decimals, false_alarm, probability};
@@ -158,10 +159,9 @@ fn robustness(found: &RobustnessRecord) -> String {
     };
     rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
     let held = found.held_out_nights.map_or_else(String::new, |held| {
-        let HeldOutRecord { delta_ln_p, sigma_delta_ln_p, nights } = held;
+        let HeldOut { delta_ln_p, sigma_delta_ln_p, nights } = held;
         format!(
-            "held-out nights: Δln p = {delta_ln_p:.1} ± {sigma_delta_ln_p:.1} with the planet, over {nights} nights, \
-            each predicted by all others\n"
+            "held-out nights: Δln p = {delta_ln_p:.1} ± {sigma_delta_ln_p:.1} in favour of the planet ({nights} nights)\n"
         )
     });
     aligned(&rows) + &held

@@ -128,9 +128,11 @@ impl RunSummary {
         match search.filter(|_| is_planet_sampled) {
             Some(search) => {
                 let remarks = summary.of_the_planet(settings, search);
-                let verdict = search.verdict.clone().with(&remarks);
-                summary.verdict =
-                    Some(verdict.with_periods(shares(&summary.period_modes, settings.star.rotation_period_d)));
+                let mut verdict = search.verdict.clone().with(&remarks);
+                if !summary.period_modes.is_empty() {
+                    verdict = verdict.with_periods(shares(&summary.period_modes, settings.star.rotation_period_d));
+                }
+                summary.verdict = Some(verdict);
                 let all = search.remarks.iter().chain(&remarks).map(|remark| &remark.text);
                 summary.remarks = all.filter(|text| !text.is_empty()).cloned().collect();
             }

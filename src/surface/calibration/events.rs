@@ -2,39 +2,24 @@
 
 use crate::model::ParameterValues;
 use crate::surface::Known;
-use crate::surface::evolving_map::events::{Unpredicted, events};
+use crate::surface::evolving_map::events::events;
 use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 
-pub use crate::surface::evolving_map::events::ByHand;
+pub use crate::surface::evolving_map::events::{ByHand, Event};
 
 /// More than this share of the profiles are not events: the model is wrong, or the errors are.
 const MOST: f64 = 1.0 / 3.0;
-
-/// A profile that all others do not predict.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Event {
-    /// Which profile, from 1.
-    pub profile: usize,
-    /// Its time (d).
-    pub time_d: f64,
-    /// Factor on its errors.
-    pub sigma_factor: f64,
-    /// chi2 per datum given all others, over that of the usual profile.
-    pub excess: f64,
-    /// Probability that chance alone makes a profile so bad; 1 where a config names it.
-    pub p_value: f64,
-}
 
 /// The events among some profiles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Events {
     /// Those whose errors are larger; all profiles keep theirs where there are too many.
     pub profiles: Vec<Event>,
-    /// Number of profiles that the others do not predict, where that is more than a third of them.
+    /// Number of profiles that the others do not predict, and of all, where that is more than a third of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub too_many: Option<usize>,
+    pub too_many: Option<[usize; 2]>,
 }
 
 impl Events {
@@ -50,19 +35,17 @@ impl Events {
         by_hand: &[ByHand],
     ) -> Result<Self, NoFit> {
         let found = events(imager, values, known, near, by_hand)?;
-        let times_d: Vec<f64> = imager.profiles().map(|(time_d, ..)| time_d).collect();
-        let unforeseen = found.iter().filter(|event| by_hand[event.profile] != ByHand::Event).count();
-        if unforeseen as f64 > MOST * times_d.len() as f64 {
-            return Ok(Events { profiles: Vec::new(), too_many: Some(unforeseen) });
+        Ok(Events::among(found, by_hand))
+    }
+
+    /// Those `found` among profiles of which so much is known `by_hand`.
+    fn among(found: Vec<Event>, by_hand: &[ByHand]) -> Self {
+        let all = by_hand.len();
+        let unforeseen = found.iter().filter(|event| by_hand[event.profile - 1] != ByHand::Event).count();
+        match unforeseen as f64 > MOST * all as f64 {
+            true => Events { profiles: Vec::new(), too_many: Some([unforeseen, all]) },
+            false => Events { profiles: found, too_many: None },
         }
-        let event = |Unpredicted { profile, factor, excess, chance }: &Unpredicted| Event {
-            profile: profile + 1,
-            time_d: times_d[*profile],
-            sigma_factor: *factor,
-            excess: *excess,
-            p_value: *chance,
-        };
-        Ok(Events { profiles: found.iter().map(event).collect(), too_many: None })
     }
 
     /// Factors on the errors of so many profiles.
@@ -74,10 +57,10 @@ impl Events {
 
     /// That there are too many, with a name for it.
     pub fn too_many(&self) -> Option<String> {
-        self.too_many.map(|count| {
+        self.too_many.map(|[events, all]| {
             format!(
-                "too-many-events: {count} profiles are not predicted by the others, more than a third: the model or \
-                observations.sigma_scale is wrong, or observations.events is to be \"none\""
+                "{events} of {all} profiles are outliers (too-many-events): the model or observations.sigma_scale is \
+                wrong; to keep all profiles as they are, set observations.events to \"none\""
             )
         })
     }
@@ -86,9 +69,32 @@ impl Events {
     pub fn line(&self) -> Option<String> {
         let of = |event: &Event| {
             let Event { profile, time_d, sigma_factor, .. } = event;
-            format!("{profile} ({time_d:.4} d, errors × {sigma_factor:.1})")
+            format!("{profile} ({time_d:.4} d, uncertainties × {sigma_factor:.1})")
         };
         let all: Vec<String> = self.profiles.iter().map(of).collect();
-        self.too_many().or((!all.is_empty()).then(|| format!("profiles {}", all.join(", "))))
+        let plural = if all.len() == 1 { "" } else { "s" };
+        self.too_many().or((!all.is_empty()).then(|| format!("outlier profile{plural} {}", all.join(", "))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_third_of_the_profiles_are_no_events() {
+        let event = |profile: usize| Event { profile, time_d: 0.1, sigma_factor: 2.5, excess: 6.0, p_value: 1e-9 };
+        let mut by_hand = vec![ByHand::Open; 12];
+        let few = Events::among((1..=4).map(event).collect(), &by_hand);
+        assert_eq!((few.factors(12)[3], few.factors(12)[4], few.too_many()), (2.5, 1.0, None));
+        let many = Events::among((1..=5).map(event).collect(), &by_hand);
+        assert_eq!(many.factors(12), vec![1.0; 12]);
+        assert!(many.too_many().unwrap().starts_with("5 of 12 profiles are outliers (too-many-events)"));
+        assert_eq!(many.line(), many.too_many());
+        // those that a user names do not count
+        by_hand[0] = ByHand::Event;
+        assert_eq!(Events::among((1..=5).map(event).collect(), &by_hand).profiles.len(), 5);
+        let one = Events::among(vec![event(3)], &by_hand).line().unwrap();
+        assert_eq!(one, "outlier profile 3 (0.1000 d, uncertainties × 2.5)");
     }
 }

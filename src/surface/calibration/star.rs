@@ -84,9 +84,6 @@ impl MeasuredStar {
     /// [`NoFit`].
     pub fn of(imager: &Imager, plain: &Fitted, known: &Known, fitted: &[Parameter]) -> Result<(Self, Assumed), NoFit> {
         let values = plain.marginal.values;
-        if fitted.is_empty() {
-            return Ok((MeasuredStar::default(), plain.marginal.assumed));
-        }
         let star = imager.star.with(&values.surface);
         let value = |parameter: Parameter| match parameter {
             Parameter::LineSigma => {

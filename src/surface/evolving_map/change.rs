@@ -8,7 +8,7 @@
 //! field is fitted as well, with an orbit of its own.
 
 use super::Known;
-use super::fit::{Fitted, NoFit, fit, share_of, usual};
+use super::fit::{Fitted, NoFit, fit, share_of_many, usual};
 use super::{Assumed, Basis, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::model::{Parameter, ParameterValues};
@@ -62,7 +62,7 @@ impl Change {
     ) -> Result<Self, NoFit> {
         let among = |imager: &Imager| Change::among(imager, values, frequencies, nuisances, known);
         let of_season = |imager: &Imager| {
-            let by_a_share = share_of(imager).and_then(|share| among(&share).ok()).filter(Change::is_changing);
+            let by_a_share = share_of_many(imager).and_then(|share| among(&share).ok()).filter(Change::is_changing);
             by_a_share.map_or_else(|| among(imager), Ok)
         };
         let mut seasons = imager.seasons();

@@ -7,14 +7,13 @@
 //! planet moves every profile, and is no event.
 
 use super::fit::fit;
+use super::star::DEGREE;
 use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::checks::chi2_exceeds;
 use crate::surface::imaging::Imager;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// Degree of the harmonics.
-const DEGREE: usize = 18;
 
 /// Fewer profiles do not tell which of them is unusual.
 const FEWEST: usize = 8;
@@ -25,6 +24,9 @@ const RARE: f64 = 1e-3;
 /// Rounds of naming and fitting: in each one those are named that are nearly as bad as the worst one.
 const ROUNDS: usize = 10;
 const ALIKE: f64 = 0.6;
+
+/// Errors of an event are large enough where its chi2 is below this, over that of the usual profile.
+const STILL: f64 = 1.2;
 
 /// What a user says of a profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,17 +43,20 @@ pub enum ByHand {
 /// Errors of an event that a user names are multiplied by this at least.
 const LEAST_BY_HAND: f64 = 3.0;
 
-/// A profile with errors of its own.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unpredicted {
-    /// Which, from 0.
+/// A profile that all others do not predict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// Which profile, from 1.
     pub profile: usize,
+    /// Its time (d).
+    pub time_d: f64,
     /// Factor on its errors.
-    pub factor: f64,
-    /// chi2 per datum as all others predict it, with errors as they were, over that of the usual profile.
+    pub sigma_factor: f64,
+    /// chi2 per datum given all others, with errors as they were, over that of the usual profile; 1 where a user names
+    /// it.
     pub excess: f64,
-    /// Probability that chance alone makes a profile so bad.
-    pub chance: f64,
+    /// Probability that chance alone makes a profile so bad; 1 where a user names it.
+    pub p_value: f64,
 }
 
 /// The profiles that the others do not predict, for a star at `values` with a field like `near`, what is known of them
@@ -65,61 +70,51 @@ pub fn events(
     known: &Known,
     near: Assumed,
     by_hand: &[ByHand],
-) -> Result<Vec<Unpredicted>, NoFit> {
+) -> Result<Vec<Event>, NoFit> {
     values.set(Parameter::K, 0.0);
-    let count = imager.profiles().count();
-    let mut factors: Vec<f64> =
-        (0..count).map(|k| if by_hand[k] == ByHand::Event { LEAST_BY_HAND } else { 1.0 }).collect();
-    let mut found: Vec<Unpredicted> = Vec::new();
+    let times_d: Vec<f64> = imager.profiles().map(|(time_d, ..)| time_d).collect();
+    let by_user = |(k, by_hand): (usize, &ByHand)| {
+        let (profile, time_d, sigma_factor) = (k + 1, times_d[k], LEAST_BY_HAND);
+        (*by_hand == ByHand::Event).then_some(Event { profile, time_d, sigma_factor, excess: 1.0, p_value: 1.0 })
+    };
+    let mut found: Vec<Option<Event>> = by_hand.iter().enumerate().map(by_user).collect();
+    let count = found.len();
     if count < FEWEST {
-        return Ok(named(found, &factors));
+        return Ok(found.into_iter().flatten().collect());
     }
     let basis = Basis::coarse(&imager.grid, DEGREE);
     let design = Arc::new(Design::new(imager, &basis, &values.state()));
-    let known_without_jitter = Known { jitter_kms: None, ..*known };
+    let with_jitter = Known { jitter_kms: None, ..*known };
     let mut marginal = Marginal::new(imager, &basis, design, values, near, None)?;
     for round in 0..ROUNDS {
-        let of_all = imager.with_larger_errors(&factors);
+        let factor = |event: &Option<Event>| event.as_ref().map_or(1.0, |event| event.sigma_factor);
+        let of_all = imager.with_larger_errors(&found.iter().map(factor).collect::<Vec<_>>());
         if round > 0 || known.jitter_kms.is_some() {
             let start = Fitted::near(marginal);
-            marginal = fit(&of_all, &basis, values, known_without_jitter, Some(&start))?.marginal;
+            marginal = fit(&of_all, &basis, values, with_jitter, Some(&start))?.marginal;
         }
         let ratios = over_usual(&of_all, &marginal.predicted_chi2(&of_all, &basis)?);
-        let mut is_settled = true;
         let chance = |k: usize| chi2_exceeds(ratios[k].0 * ratios[k].1, ratios[k].1);
-        let fails = |k: usize| by_hand[k] == ByHand::Open && factors[k] == 1.0 && chance(k) < RARE / count as f64;
-        let worst = (0..count).filter(|k| fails(*k)).map(|k| ratios[k].0).fold(1.0, f64::max);
+        let fails = |k: &usize| by_hand[*k] == ByHand::Open && found[*k].is_none() && chance(*k) < RARE / count as f64;
+        let failing: Vec<usize> = (0..count).filter(fails).collect();
+        let worst = failing.iter().map(|k| ratios[*k].0).fold(1.0, f64::max);
+        let mut is_settled = failing.is_empty();
+        // as they were named, errors may still be too small
+        for (event, (ratio, _)) in found.iter_mut().zip(&ratios).filter_map(|(event, of)| Some((event.as_mut()?, of))) {
+            is_settled &= *ratio < STILL;
+            event.sigma_factor *= ratio.sqrt().max(1.0);
+        }
         // an event makes its neighbours look like some
-        let is_named = |k: &usize| fails(*k) && ratios[*k].0 - 1.0 > ALIKE * (worst - 1.0);
-        let named: Vec<(usize, f64)> = (0..count).filter(is_named).map(|k| (k, chance(k))).collect();
-        for k in 0..count {
-            let ratio = ratios[k].0;
-            let known = found.iter().any(|event| event.profile == k);
-            if known || factors[k] > 1.0 {
-                // as it was named, its errors may still be too small
-                is_settled &= ratio < 1.2;
-                factors[k] *= ratio.sqrt().max(1.0);
-            } else if let Some((_, chance)) = named.iter().find(|(named, _)| *named == k) {
-                found.push(Unpredicted { profile: k, factor: 1.0, excess: ratio, chance: *chance });
-                factors[k] = ratio.sqrt();
-                is_settled = false;
-            }
+        for k in failing.into_iter().filter(|k| ratios[*k].0 - 1.0 > ALIKE * (worst - 1.0)) {
+            let (excess, time_d) = (ratios[k].0, times_d[k]);
+            let (profile, sigma_factor, p_value) = (k + 1, excess.sqrt(), chance(k));
+            found[k] = Some(Event { profile, time_d, sigma_factor, excess, p_value });
         }
         if is_settled {
             break;
         }
     }
-    Ok(named(found, &factors))
-}
-
-/// Those with larger errors, in order.
-fn named(found: Vec<Unpredicted>, factors: &[f64]) -> Vec<Unpredicted> {
-    let of = |(profile, factor): (usize, &f64)| {
-        let named = found.iter().find(|event| event.profile == profile);
-        let named = named.copied().unwrap_or(Unpredicted { profile, factor: 1.0, excess: 1.0, chance: 1.0 });
-        (*factor > 1.0).then_some(Unpredicted { factor: *factor, ..named })
-    };
-    factors.iter().enumerate().filter_map(of).collect()
+    Ok(found.into_iter().flatten().collect())
 }
 
 /// Of each profile chi2 per datum over that of the median profile of its data set, and its number of independent data.

@@ -154,17 +154,22 @@ fn by_a_share(
     values: ParameterValues,
     known: Known,
 ) -> Option<(Assumed, Option<Matrix4<f64>>)> {
-    let share = share_of(imager).filter(|_| known.is_open())?;
+    let share = share_of_many(imager).filter(|_| known.is_open())?;
     let Fitted { marginal, hessian, .. } = fit(&share, basis, values, known, None).ok()?;
     Some((marginal.assumed, hessian))
 }
 
-/// Every n-th profile, where there are [`MANY`]: at most half as many as that.
-pub(super) fn share_of(imager: &Imager) -> Option<Imager> {
+/// A share of the profiles where there are [`MANY`]: at most half as many as that.
+pub(super) fn share_of_many(imager: &Imager) -> Option<Imager> {
+    if imager.profiles().count() >= MANY { share_of(imager, MANY / 2) } else { None }
+}
+
+/// Every n-th profile, so that there are so many at most; `None` where there are no more.
+pub(super) fn share_of(imager: &Imager, most: usize) -> Option<Imager> {
     let profiles = imager.profiles().count();
-    let every = profiles.div_ceil(MANY / 2);
+    let every = profiles.div_ceil(most);
     let others = || (0..profiles).filter(|k| k % every != 0).collect::<Vec<_>>();
-    (profiles >= MANY).then(|| imager.without(&others()))
+    (every > 1).then(|| imager.without(&others()))
 }
 
 /// Where a fit may start: several lifetimes, each with and without a jitter, as far as they are not known.

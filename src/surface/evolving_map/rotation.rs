@@ -5,7 +5,7 @@
 //! to agree, other periods are tried with spots that last; where ln Z is highest the field is fitted as it was at the
 //! period that is given.
 
-use super::fit::{Fitted, fit, share_of};
+use super::fit::{Fitted, fit, share_of_many};
 use super::{Assumed, Basis, Design, Known, Marginal};
 use crate::field::{Field, Kernel, Lifetime};
 use crate::model::{Parameter, ParameterValues};
@@ -67,7 +67,7 @@ impl OtherRotation {
             values.set(Parameter::K, 0.0);
             values
         };
-        let (share, basis) = (share_of(imager), Basis::coarse(&imager.grid, DEGREE));
+        let (share, basis) = (share_of_many(imager), Basis::coarse(&imager.grid, DEGREE));
         let fewer = share.as_ref().unwrap_or(imager);
         // ln Z with spots that live so many rotations
         let height = |period_d: f64, rotations: f64| {

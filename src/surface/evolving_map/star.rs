@@ -6,7 +6,7 @@
 //! the same of lines.
 
 use super::climb::{LEAST_BEND, USUAL_BEND, assumed_at, limits as limits_of_field, place as place_of_field};
-use super::fit::fit;
+use super::fit::{fit, share_of};
 use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::field::FieldError;
 use crate::model::{Parameter, ParameterValues};
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Degree of the harmonics.
-const DEGREE: usize = 18;
+pub(super) const DEGREE: usize = 18;
 
 /// A climb ends when a step would gain less than this in ln Z, or after so many.
 const GAIN: f64 = 1.0;
@@ -133,7 +133,7 @@ pub fn fit_star(
     needed: f64,
 ) -> Result<FittedStar, FieldError> {
     let assumed = near.marginal.assumed;
-    let few = share_of(imager);
+    let few = share_of(imager, FEW);
     let climb = Climb::new(few.as_ref().unwrap_or(imager), known, &assumed, priors);
     let of_line = climb.priors.iter().filter(|prior| prior.is_of_line()).count();
     let mut start = near.marginal.clone();
@@ -165,14 +165,6 @@ pub fn fit_star(
     let climb = Climb { imager, ..climb };
     let top = climb.up(climb.condensed_at(&top.point.place, &near.marginal, None)?, Some(of_field))?;
     Ok(climb.fitted(&top))
-}
-
-/// A share of many profiles, from which a climb starts: most of the way up takes a fraction of the work.
-fn share_of(imager: &Imager) -> Option<Imager> {
-    let profiles = imager.profiles().count();
-    let every = profiles.div_ceil(FEW);
-    let others = || (0..profiles).filter(|k| k % every != 0).collect::<Vec<_>>();
-    (every > 1).then(|| imager.without(&others()))
 }
 
 /// The coordinate of a number of active regions in which the profiles are nearly linear: what their line changes goes

@@ -35,9 +35,6 @@ use simulation::check_plan;
 use star::{fitted_star, resolve_instrument, resolve_star};
 use std::path::{Path, PathBuf};
 
-/// RV stability of a spectrograph of which nothing is known (km/s): that of ESPaDOnS and NARVAL (`instruments`).
-const USUAL_STABILITY_KMS: f64 = 0.03;
-
 /// A stability is no better than this (km/s).
 const BEST_STABILITY_KMS: f64 = 1e-4;
 
@@ -336,7 +333,7 @@ impl Settings {
             },
             priors,
             jitter_kms: self.velocity_jitter.number(),
-            jitter_scale_kms: Some(self.stability_kms.unwrap_or(USUAL_STABILITY_KMS).max(BEST_STABILITY_KMS)),
+            jitter_scale_kms: self.stability_kms.map(|scale| scale.max(BEST_STABILITY_KMS)),
         }
     }
 

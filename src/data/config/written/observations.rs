@@ -75,9 +75,9 @@ pub struct ObservationsSection {
     /// With `path`: windows of time `[start, end]` (d), transits for example: profiles within are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<[f64; 2]>,
-    /// Profiles that all others do not predict, as of flares: "fitted", their errors are multiplied by what the others
-    /// ask for; "none", they are profiles like all others. "fitted" with the objective "marginal-likelihood" if not
-    /// given. Or by hand, times that are never events, and times that always are.
+    /// Outlier profiles, such as those taken during flares. "fitted" (the default with objective
+    /// "marginal-likelihood"): uncertainties of profiles that the others do not predict are multiplied by a fitted
+    /// factor. "none": all profiles are treated alike. An object sets single profiles by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub events: Option<EventsKey>,
     /// Simulated profiles of the star and planet of this config. In a list of data sets the first one has the spots.
@@ -85,13 +85,16 @@ pub struct ObservationsSection {
     pub simulate: Option<SimulateSection>,
 }
 
-/// Profiles that all others do not predict.
+/// Outlier profiles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "must be \"fitted\", \"none\", or windows of time {\"include\": [[start, end]], \"exclude\": []}"
+)]
 pub enum EventsKey {
-    /// Whether they are looked for.
+    /// Whether they are fitted.
     Word(EventsWord),
-    /// They are looked for, but for some that are known.
+    /// Fitted, except for profiles in these windows.
     Windows(EventWindows),
 }
 
@@ -105,14 +108,14 @@ pub enum EventsWord {
     None,
 }
 
-/// Windows of time `[start, end]` (d) in which profiles are, or are not, events.
+/// Windows of time `[start, end]` (d) in which profiles are, or are not, outliers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EventWindows {
-    /// Profiles within are events: their errors are multiplied by 3 at least.
+    /// Profiles within are outliers: their uncertainties are multiplied by at least 3.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub include: Vec<[f64; 2]>,
-    /// Profiles within are none.
+    /// Profiles within are never outliers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<[f64; 2]>,
 }
