@@ -161,7 +161,7 @@ fn robustness(found: &RobustnessRecord) -> String {
     let held = found.held_out_nights.map_or_else(String::new, |held| {
         let HeldOut { delta_ln_p, sigma_delta_ln_p, nights } = held;
         format!(
-            "held-out nights: Δln p = {delta_ln_p:.1} ± {sigma_delta_ln_p:.1} in favour of the planet ({nights} nights)\n"
+            "held-out nights: Δln p = {delta_ln_p:.1} ± {sigma_delta_ln_p:.1} (planet minus no planet, {nights} nights)\n"
         )
     });
     aligned(&rows) + &held
