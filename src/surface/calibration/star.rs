@@ -131,12 +131,10 @@ impl MeasuredStar {
     pub fn line(&self) -> String {
         let MeasuredStar { numbers, mean_profile, gain } = self;
         if numbers.is_empty() {
-            return match *gain < NEEDED {
-                true => format!("regions as the photosphere, dimmed (Δln Z of their own line = {gain:.1})"),
-                false => format!(
-                    "regions as the photosphere, dimmed; far from solar ones gain Δln Z = {gain:.0}: see star.fitted"
-                ),
-            };
+            let why = if *gain < NEEDED { "" } else { ", too little for values so far from their priors" };
+            return format!(
+                "as in the config, regions with the photosphere's line (a fit gains Δln Z = {gain:.1}{why})"
+            );
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
             let name = name.trim_end_matches("_kms").replace('_', " ");
