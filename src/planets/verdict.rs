@@ -194,12 +194,13 @@ impl Verdict {
         }
     }
 
-    /// The same of a period that has these posterior shares (in any order, summing to 1 or less), in place of those that
-    /// it had: a planet may be detected while its period is not.
+    /// The same of a period that has these posterior shares (in any order, summing to 1 or less), in place of those it
+    /// had: a planet may be detected while its period is not.
     pub fn with_periods(mut self, mut shares: Vec<PeriodShare>) -> Self {
-        let (None, Some(probability), Some(signal)) = (self.known, self.false_alarm_probability, self.signal) else {
+        let (Some(probability), Some(signal)) = (self.false_alarm_probability, self.signal) else { return self };
+        if self.known.is_some() {
             return self;
-        };
+        }
         shares.sort_by(|a, b| b.share.total_cmp(&a.share));
         let is_clear = shares.first().is_none_or(|first| first.share > UNAMBIGUOUS);
         shares.retain(|of| of.share >= LEAST_SHARE);

@@ -160,9 +160,8 @@ fn robustness(found: &RobustnessRecord) -> String {
     rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
     let held = found.held_out_nights.map_or_else(String::new, |held| {
         let HeldOut { delta_ln_p, sigma_delta_ln_p, nights } = held;
-        format!(
-            "held-out nights: Δln p = {delta_ln_p:.1} ± {sigma_delta_ln_p:.1} (planet minus no planet, {nights} nights)\n"
-        )
+        let gain = format!("{delta_ln_p:.1} ± {sigma_delta_ln_p:.1}");
+        format!("held-out nights: Δln p = {gain} (planet minus no planet, {nights} nights)\n")
     });
     aligned(&rows) + &held
 }
