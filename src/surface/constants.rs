@@ -3,7 +3,7 @@
 
 use super::Linearised;
 use super::expansion::Nuisance;
-use super::imaging::{Drift, Imager};
+use super::imaging::{DriftOf, Imager};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::{Common, common_velocities};
@@ -26,23 +26,30 @@ pub struct FoundDrift {
     pub kms_d: f64,
     /// Its standard error (km/s per day).
     pub sigma_kms_d: f64,
+    /// Number of the data set (from 1) that it is of, where the offset of that set is fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub data_set: Option<usize>,
 }
 
 /// A drift of so many standard errors is one.
 const SIGNIFICANT: f64 = 4.0;
 
 impl FoundDrift {
+    /// In units of its error.
+    fn sigmas(&self) -> f64 {
+        self.kms_d.abs() / self.sigma_kms_d
+    }
+
     /// It in words.
     pub fn line(&self) -> String {
-        let FoundDrift { kms_d, sigma_kms_d } = self;
+        let FoundDrift { kms_d, sigma_kms_d, data_set } = self;
         let m_s = |kms: f64| format!("{:.1}", 1000.0 * kms);
-        let of = format!("RV drift: {} ± {} m/s/d", m_s(*kms_d), m_s(*sigma_kms_d));
-        match kms_d.abs() > SIGNIFICANT * sigma_kms_d {
-            true => {
-                let sigmas = kms_d.abs() / sigma_kms_d;
-                format!("{of} ({sigmas:.0}σ): a long-period companion or instrumental drift")
-            }
-            false => of,
+        let of_set = data_set.map_or_else(String::new, |set| format!(" of data set {set}"));
+        let of = format!("RV drift{of_set}: {} ± {} m/s/d", m_s(*kms_d), m_s(*sigma_kms_d));
+        let is = "subtracted from rv_kms";
+        match self.sigmas() > SIGNIFICANT {
+            true => format!("{of} ({:.0}σ), {is}: a long-period companion or instrumental drift", self.sigmas()),
+            false => format!("{of}, {is}"),
         }
     }
 }
@@ -54,9 +61,9 @@ pub struct Constants {
     pub systemic: Option<ConstantVelocity>,
     /// RV offsets of those data sets whose offset is fitted, in the order of the sets.
     pub offsets: Vec<ConstantVelocity>,
-    /// Drift of the velocities, where one is integrated out.
+    /// Drift of the velocities, where one is integrated out: of several the most significant.
     pub drift: Option<FoundDrift>,
-    /// What offsets and systemic velocity add to the velocity of each profile in [`Linearised::held`] (km/s).
+    /// What systemic velocity, offsets and drift add to the velocity of each profile in [`Linearised::held`] (km/s).
     pub of_each_kms: DVector<f64>,
 }
 
@@ -82,15 +89,20 @@ impl Linearised {
         let mut found = found.map(|(at, (value, sigma))| ConstantVelocity { value_kms: at + value, sigma_kms: *sigma });
         let of_each = |sum: DVector<f64>, (common, value): (&Common, &f64)| sum + *value * &common.of_each;
         let constant = usize::from(is_free) + imager.zero_points.len();
-        let drift = imager.drift.map(|Drift { half_span_d, .. }| {
-            let [value_kms, sigma_kms] = [values[constant], sigmas[constant]];
-            FoundDrift { kms_d: value_kms / half_span_d, sigma_kms_d: sigma_kms / half_span_d }
-        });
+        let terms = imager.drift.map_or(1, |drift| drift.terms());
+        let slope = |(k, of): (usize, &DriftOf)| {
+            let (value_kms, sigma_kms) = (values[constant + k * terms], sigmas[constant + k * terms]);
+            let [kms_d, sigma_kms_d] = [value_kms, sigma_kms].map(|kms| kms / of.half_span_d);
+            FoundDrift { kms_d, sigma_kms_d, data_set: of.set.map(|set| set + 1) }
+        };
+        let drifts = imager.drifts();
+        let slopes = drifts.iter().enumerate().map(slope);
+        let drift = slopes.max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()));
         Some(Constants {
             systemic: if is_free { found.next() } else { None },
             offsets: found.collect(),
             drift,
-            of_each_kms: all[..constant].iter().zip(&values).fold(DVector::zeros(n), of_each),
+            of_each_kms: all.iter().zip(&values).fold(DVector::zeros(n), of_each),
         })
     }
 }

@@ -69,31 +69,43 @@ pub struct Imager {
     pub drift: Option<Drift>,
 }
 
-/// A drift of the velocities: a polynomial in time, around the middle of the data, with Gaussian priors.
+/// A drift of the velocities: a polynomial in time with Gaussian priors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Middle of the data (d).
-    pub mid_d: f64,
-    /// Half of their span (d).
-    pub half_span_d: f64,
     /// Whether there is a curvature beside the slope.
     pub curved: bool,
 }
 
-/// Standard deviation of the prior of a drift: of the velocity (km/s) at the end of the data over that in the middle.
-pub const DRIFT_KMS: f64 = 0.5;
+/// The drift of profiles whose offsets are known: time counts from the middle of these profiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriftOf {
+    /// The data set, where its offset is fitted: a drift of the star from set to set would not be told from it.
+    pub set: Option<usize>,
+    /// The profiles.
+    profiles: Vec<usize>,
+    /// Middle of their times (d).
+    mid_d: f64,
+    /// Half of their span (d).
+    pub half_span_d: f64,
+}
+
+/// Standard deviation of the prior of a drift: of the velocity (km/s) at the end of the data over that in the middle,
+/// and of its slope (km/s/d) where that is less. No spectrograph and no companion on a long orbit drifts faster, and a
+/// planet is not to be taken for a drift within one or two nights.
+const DRIFT: (f64, f64) = (0.5, 0.1);
 
 impl Drift {
-    /// Of data taken at these times (d); `None` where they are one.
-    pub fn of(times_d: &[f64], curved: bool) -> Option<Self> {
-        let ends = times_d.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-        let (mid_d, half_span_d) = (0.5 * (ends.0 + ends.1), 0.5 * (ends.1 - ends.0));
-        (half_span_d > 0.0 && half_span_d.is_finite()).then_some(Drift { mid_d, half_span_d, curved })
-    }
-
     /// Number of its terms.
     pub fn terms(&self) -> usize {
         if self.curved { 2 } else { 1 }
+    }
+}
+
+impl DriftOf {
+    /// Standard deviation of each term (km/s).
+    fn sd_kms(&self) -> f64 {
+        let (kms, kms_d) = DRIFT;
+        kms.min(kms_d * self.half_span_d)
     }
 
     /// Velocities at a time (d) by one km/s of each term.
@@ -210,12 +222,35 @@ impl Imager {
             Common { of_each, mean_kms: prior.mean_kms, sd_kms: prior.sd_kms }
         };
         let mut all: Vec<Common> = self.zero_points.iter().map(offset).collect();
-        for (drift, term) in self.drift.iter().flat_map(|drift| (0..drift.terms()).map(move |term| (drift, term))) {
+        let (drifts, times_d) = (self.drifts(), self.times_d());
+        for (of, term) in drifts.iter().flat_map(|of| (0..self.drift.map_or(0, |d| d.terms())).map(move |t| (of, t))) {
             let mut of_each = DVector::zeros(coordinates);
-            self.times_d().iter().enumerate().for_each(|(k, time_d)| of_each[k] = drift.at(*time_d)[term]);
-            all.push(Common { of_each, mean_kms: 0.0, sd_kms: DRIFT_KMS });
+            of.profiles.iter().for_each(|k| of_each[*k] = of.at(times_d[*k])[term]);
+            all.push(Common { of_each, mean_kms: 0.0, sd_kms: of.sd_kms() });
         }
         all
+    }
+
+    /// The drifts that are integrated out: that of all profiles whose offsets are known, and one of each data set whose
+    /// offset is fitted.
+    pub fn drifts(&self) -> Vec<DriftOf> {
+        if self.drift.is_none() {
+            return Vec::new();
+        }
+        let is_fitted = |set: &usize| self.zero_points.iter().any(|prior| prior.set == *set);
+        let (own, together): (Vec<usize>, Vec<usize>) = (0..self.sets.len()).partition(is_fitted);
+        let times_d = self.times_d();
+        let of = |set: Option<usize>, profiles: Vec<usize>| {
+            let times = profiles.iter().map(|k| times_d[*k]);
+            let ends = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
+            let (mid_d, half_span_d) = (0.5 * (ends.0 + ends.1), 0.5 * (ends.1 - ends.0));
+            (half_span_d > 0.0 && half_span_d.is_finite()).then_some(DriftOf { set, profiles, mid_d, half_span_d })
+        };
+        let of_all = of(None, together.into_iter().flat_map(|set| self.profiles_of(set)).collect());
+        of_all
+            .into_iter()
+            .chain(own.into_iter().filter_map(|set| of(Some(set), self.profiles_of(set).collect())))
+            .collect()
     }
 
     /// Whether there are such velocities.

@@ -82,21 +82,29 @@ fn what_profiles_have_in_common_is_told_apart() {
     }
     let desk = Desk::new(simulated.clone());
     desk.succeed(&["simulate", CONFIG, "--out", "data"]);
-    let mut config = from_files(&simulated);
-    desk.write("held.json", &config.to_string());
-    config["parameters"]["vsys_kms"] = json!({ "prior": "uniform", "min": -0.9, "max": 1.1 });
-    desk.write("free.json", &config.to_string());
+    let config = from_files(&simulated);
+    let vsys = json!({ "prior": "uniform", "min": -0.9, "max": 1.1 });
+    let config_with = |keys: &[(&str, &str, Value)]| {
+        let mut config = config.clone();
+        keys.iter().for_each(|(section, key, value)| config[*section][*key] = value.clone());
+        config.to_string()
+    };
+    let still = ("star", "velocity_drift", json!("none"));
+    desk.write("held.json", &config_with(std::slice::from_ref(&still)));
+    desk.write("still.json", &config_with(&[still, ("parameters", "vsys_kms", vsys.clone())]));
+    desk.write("free.json", &config_with(&[("parameters", "vsys_kms", vsys)]));
     let search = |name: &str| {
         let table = desk.succeed(&["periodogram", &format!("{name}.json"), "--out", name]);
         (table, desk.json(&format!("{name}/periodogram.json")))
     };
-    let [(_, held), (table, free)] = [search("held"), search("free")];
+    let [(_, held), (_, still), (table, free)] = [search("held"), search("still"), search("free")];
     let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{value}"));
     let velocity = |of: &Value| [number(&of["value_kms"]), number(&of["sigma_kms"])];
     let offset = |found: &Value| velocity(&found["measured"]["sets"][1]["zero_point"]);
-    let [[_, sigma_held], [value, sigma]] = [offset(&held), offset(&free)];
+    let [[_, sigma_held], [_, sigma_still], [value, sigma]] = [offset(&held), offset(&still), offset(&free)];
     assert!((value - 0.3).abs() < 2.0 * sigma && sigma < 0.2, "{value} +- {sigma}");
-    assert!(sigma > 1.2 * sigma_held, "{sigma} {sigma_held}");
+    assert!(sigma_still > 1.2 * sigma_held, "{sigma_still} {sigma_held}");
+    assert!(sigma > 0.95 * sigma_still, "{sigma} {sigma_still}");
     says(&table, &[&format!("RV offset {value:.3} ± {sigma:.3} km/s"), "systemic velocity: "]);
     assert_eq!(held.get("systemic_velocity"), None);
     let [vsys, sigma_vsys] = velocity(&free["systemic_velocity"]);

@@ -10,6 +10,7 @@ use crate::star::observation::Observations;
 use crate::star::{Sampling, Seen, StarSettings};
 use crate::surface::calibration::offsets;
 use crate::surface::calibration::offsets::HeldZeroPoint;
+use crate::surface::calibration::star::too_wide_kms;
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::{Drift, Imager, ZeroPointPrior};
 
@@ -39,6 +40,10 @@ pub fn imager(
     let seen: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
     let all = Observations::joined(parts.to_vec());
     let imager = Imager::of_sets(star, seen, &all, settings.imaging.pixels, settings.imaging.entropy());
+    if let Some(fwhm_kms) = too_wide_kms(&imager, &imager.star) {
+        let problem = format!("the line of active regions, {fwhm_kms:.0} km/s wide, exceeds the velocity range");
+        return Err(settings.fault("star.regions.line_width", &problem));
+    }
     let mut imager = with_seasons(imager, seasons);
     if sets.iter().any(|set| set.nuisances.is_some()) {
         let priors = sets.iter().map(|set| set.nuisances.unwrap_or_default());
@@ -46,7 +51,7 @@ pub fn imager(
     }
     imager.drift = match settings.drift {
         VelocityDrift::None => None,
-        drift => Drift::of(&imager.times_d(), drift == VelocityDrift::Quadratic),
+        drift => Some(Drift { curved: drift == VelocityDrift::Quadratic }),
     };
     for (set, DataSetSettings { zero_point, .. }) in sets.iter().enumerate() {
         match *zero_point {

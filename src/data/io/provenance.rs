@@ -121,6 +121,12 @@ impl Measured {
         self
     }
 
+    /// Why nothing can be judged with what was found of star and events, with a name for it.
+    pub fn problem(&self) -> Option<String> {
+        let of_events = self.events.as_ref().and_then(Events::too_many);
+        of_events.or_else(|| self.star.as_ref().and_then(MeasuredStar::problem))
+    }
+
     /// That the model does not fit as well as the continuum promises, where the errors say so.
     pub fn misfit_text(&self) -> Option<String> {
         let of_set = |set: &MeasuredSet| Some(format!("{}: {}", set.name, set.errors.as_ref()?.misfit_text()?));

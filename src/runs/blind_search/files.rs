@@ -60,7 +60,7 @@ impl BlindSearch<'_> {
     }
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
-    /// What profiles have in common, systemic velocity and RV offsets, is taken out, and held in the covariance.
+    /// What profiles have in common, systemic velocity, RV offsets and drift, is taken out, and held in the covariance.
     fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
         let held = &self.detection.last().held;
         let n = held.len();

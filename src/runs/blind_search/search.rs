@@ -10,7 +10,6 @@ use crate::inference::detection::{Detection, DetectionSettings, Evidence, Robust
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Parameter, for_blind_search};
 use crate::planets::verdict::{Remark, Verdict};
-use crate::surface::calibration::events::Events;
 use crate::surface::{Constants, Explained, Linearised};
 use std::borrow::Cow;
 
@@ -103,7 +102,7 @@ impl<'a> BlindSearch<'a> {
                 remarks.push(Remark::note(known.sentence.clone()));
             }
         }
-        if let Some(text) = scene.measured.events.as_ref().and_then(Events::too_many) {
+        if let Some(text) = scene.measured.problem() {
             verdict = Verdict::not_judged(text);
         }
         let evidence = scene.evidence(&detection.jitters());

@@ -6,7 +6,8 @@
 //! sections 2 and 3). They are wide: regions of other stars are stronger.
 
 use crate::model::{Parameter, ParameterValues};
-use crate::star::LocalLine;
+use crate::numerics::units::FWHM_PER_SIGMA;
+use crate::star::{LocalLine, Seen, StarSettings};
 use crate::surface::Known;
 use crate::surface::evolving_map::star::{FittedStar, StarPrior, fit_star};
 use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
@@ -50,6 +51,25 @@ fn prior(parameter: Parameter, value: f64) -> StarPrior {
     }
 }
 
+/// Whether a number of active regions lies on a bound; no surface of theirs is none of it.
+fn is_at_bound(prior: &StarPrior, value: f64) -> bool {
+    let (low, high) = prior.bounds;
+    let near = 1e-6 * (high - low);
+    let is_low = value < low + near && prior.parameter != Parameter::RegionArea;
+    Parameter::REGIONS.contains(&prior.parameter) && (is_low || value > high - near)
+}
+
+/// Full width at half maximum of the line of active regions (km/s), where no profile is as wide.
+pub fn too_wide_kms(imager: &Imager, star: &StarSettings) -> Option<f64> {
+    let widest = |set: &Seen| {
+        let bins = set.sampling.profiles.iter().map(|profile| profile.2).max().unwrap_or(0);
+        bins as f64 * set.sampling.step_kms
+    };
+    let range_kms = imager.sets.iter().map(widest).fold(0.0, f64::max);
+    let fwhm_kms = FWHM_PER_SIGMA * star.regions.line(star.line).sigma_kms;
+    (!star.regions.are_plain() && fwhm_kms > range_kms).then_some(fwhm_kms)
+}
+
 /// Regions have to gain so much in ln Z, what their numbers are free to be counted against them.
 const NEEDED: f64 = 5.0;
 
@@ -74,6 +94,12 @@ pub struct MeasuredStar {
     pub mean_profile: f64,
     /// What all of it gains in ln Z.
     pub gain: f64,
+    /// Names of those numbers of active regions that the evidence drives to a bound.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub at_bounds: Vec<String>,
+    /// Full width at half maximum of the line of active regions (km/s), where it is wider than the velocity range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub too_wide_kms: Option<f64>,
 }
 
 impl MeasuredStar {
@@ -107,7 +133,11 @@ impl MeasuredStar {
             value: values[prior.parameter],
             sigma: *sigma,
         };
-        Ok((MeasuredStar { numbers: priors.iter().zip(&sd).map(number).collect(), mean_profile, gain }, assumed))
+        let at_bounds = priors.iter().filter(|prior| is_at_bound(prior, values[prior.parameter]));
+        let at_bounds = at_bounds.map(|prior| prior.parameter.name().to_owned()).collect();
+        let numbers = priors.iter().zip(&sd).map(number).collect();
+        let too_wide_kms = too_wide_kms(imager, &imager.star.with(&values.surface));
+        Ok((MeasuredStar { numbers, mean_profile, gain, at_bounds, too_wide_kms }, assumed))
     }
 
     /// Puts what was found into what profiles are imaged with.
@@ -127,9 +157,25 @@ impl MeasuredStar {
         }
     }
 
+    /// Why active regions as they were found cannot be, with a name for it.
+    pub fn problem(&self) -> Option<String> {
+        let words = |name: &String| name.trim_end_matches("_kms").replace('_', " ");
+        let cure = "check velocity range and star.line, or set star.regions.area to 0";
+        if let Some(fwhm_kms) = self.too_wide_kms {
+            return Some(format!(
+                "the fitted line of active regions, {fwhm_kms:.0} km/s wide, exceeds the velocity range \
+                 (region-too-wide): {cure}"
+            ));
+        }
+        let names: Vec<String> = self.at_bounds.iter().map(words).collect();
+        let plural = if names.len() == 1 { "its bound" } else { "their bounds" };
+        let all = names.join(", ");
+        (!names.is_empty()).then(|| format!("{all} at {plural} (region-at-bound): {cure}"))
+    }
+
     /// It in words.
     pub fn line(&self) -> String {
-        let MeasuredStar { numbers, mean_profile, gain } = self;
+        let MeasuredStar { numbers, mean_profile, gain, .. } = self;
         if numbers.is_empty() {
             let why = if *gain < NEEDED { "" } else { ", too little for values so far from their priors" };
             return format!(
@@ -146,5 +192,28 @@ impl MeasuredStar {
             size => format!(", mean profile {:.2} %", 100.0 * size),
         };
         format!("{}{mean} (Δln Z = {gain:.0})", all.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_at_a_bound_have_a_name() {
+        let prior = |parameter: Parameter| prior(parameter, 1.0);
+        let high = |parameter: Parameter| prior(parameter).bounds.1;
+        assert!(is_at_bound(&prior(Parameter::RegionLineWidth), high(Parameter::RegionLineWidth)));
+        assert!(!is_at_bound(&prior(Parameter::RegionLineWidth), 1.3));
+        // none of the surface is a star without regions
+        assert!(!is_at_bound(&prior(Parameter::RegionArea), 0.0));
+        assert!(is_at_bound(&prior(Parameter::RegionArea), high(Parameter::RegionArea)));
+        let at_bounds = vec!["region_line_width".to_owned(), "region_shift_kms".to_owned()];
+        let star = MeasuredStar { at_bounds, ..MeasuredStar::default() };
+        let said = star.problem().unwrap();
+        assert!(said.starts_with("region line width, region shift at their bounds (region-at-bound): "), "{said}");
+        let wide = MeasuredStar { too_wide_kms: Some(95.0), ..star };
+        assert!(wide.problem().unwrap().contains("95 km/s wide, exceeds the velocity range (region-too-wide)"));
+        assert_eq!(MeasuredStar::default().problem(), None);
     }
 }

@@ -110,11 +110,14 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         true => fitted_star(&written.star)?,
         false => Vec::new(),
     };
-    let drift = written.star.velocity_drift.unwrap_or(VelocityDrift::None);
-    if drift != VelocityDrift::None && !written.imaging.objective.properties().has_field {
-        let problem = "no effect but with imaging.objective \"marginal-likelihood\"";
-        return Err(Fault::new("star.velocity_drift", problem));
-    }
+    let drift = match (written.star.velocity_drift, written.imaging.objective.properties().has_field) {
+        (given, true) => given.unwrap_or(VelocityDrift::Linear),
+        (None | Some(VelocityDrift::None), false) => VelocityDrift::None,
+        (Some(_), false) => {
+            let problem = "no effect but with imaging.objective \"marginal-likelihood\"";
+            return Err(Fault::new("star.velocity_drift", problem));
+        }
+    };
     let grid = written.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
     let resolved = serde_json::to_value(&written).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {

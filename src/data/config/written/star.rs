@@ -57,8 +57,8 @@ pub struct Star<Period = f64> {
     /// "limb_darkening".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<String>,
-    /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood".
-    /// "none" if not given.
+    /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood", and
+    /// then "linear" if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_drift: Option<VelocityDrift>,
     /// Active regions: their line and limb contrast. Fitted if not given, with objective "marginal-likelihood";

@@ -13,7 +13,7 @@ use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::csv::{Columns, DATA_SET};
 use crate::runs::blind_search::{FILE, PeriodogramFile};
 use crate::runs::origin;
-use crate::surface::ConstantVelocity;
+use crate::surface::{ConstantVelocity, FoundDrift};
 use loss::Loss;
 use nalgebra::{DMatrix, DVector};
 use std::fmt::Write as _;
@@ -147,12 +147,15 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
         Some(ConstantVelocity { value_kms, sigma_kms }) => format!("{value_kms:.4} +- {sigma_kms:.4} km/s."),
         None => "of the config.".to_owned(),
     };
+    let slope = search.drift.map_or_else(String::new, |FoundDrift { kms_d, .. }| {
+        format!(", and a slope: that of the drift,\n{:.2} m/s/d, is subtracted", 1000.0 * kms_d)
+    });
     let mut text = format!(
         "{TITLE} {}\n\n\
         {} velocities and their covariance, spots marginalised out. Times are days, as in the list of profiles.\n\
         Velocities are relative to the systemic velocity {}\n\
         Their errors and covariance do not include the error of what all profiles, or those of a data set, have in\n\
-        common: leave a constant velocity free in every fit, for each data set.\n\n\
+        common: leave a constant velocity free in every fit, for each data set{slope}.\n\n\
         radvel.csv           m/s   radvel: time, mnvel, errvel, tel\n\
         juliet.dat           m/s   juliet: time, velocity, error, instrument; no head\n\
         kima.txt             m/s   kima: time, velocity, error; RVData('kima.txt', skip=1)\n\
