@@ -19,7 +19,7 @@ use crate::surface::calibration::events::{ByHand, Events};
 use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, NoMaps, SurfaceMaps, SurfaceSettings};
+use crate::surface::{At, Known, NoMaps, SurfaceMaps, SurfaceSettings};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -123,7 +123,9 @@ impl Scene {
         }
         let (known, values) = (self.settings.known_field(), self.settings.values);
         match calibration::found(&self.imager, values, &known, (&fitted, by_hand.as_deref()), report) {
-            Ok((star, events)) => self.with_found(&Measured { star, events, ..Measured::default() }),
+            Ok((star, events, near)) => {
+                self.with_found(&Measured { star, events, field_start: Some(near), ..Measured::default() })
+            }
             Err(error) => {
                 self.measured.profiles.push(format!("star and outliers not fitted: {error}"));
                 self
@@ -150,10 +152,11 @@ impl Scene {
     #[must_use]
     #[doc(hidden)]
     pub fn with_found(self, found: &Measured) -> Self {
-        let scene = match &found.star {
+        let mut scene = match &found.star {
             Some(star) => self.with_star(star.clone()),
             None => self,
         };
+        scene.measured.field_start = scene.measured.field_start.or(found.field_start);
         match &found.events {
             Some(events) if scene.measured.events.is_none() => scene.with_events(events.clone()),
             _ => scene,
@@ -226,7 +229,8 @@ impl Scene {
     /// What is assumed of the spots.
     #[doc(hidden)]
     pub fn surface(&self) -> SurfaceSettings {
-        let (objective, field) = (self.settings.imaging.objective, self.settings.known_field());
+        let objective = self.settings.imaging.objective;
+        let field = Known { start: self.measured.field_start, ..self.settings.known_field() };
         SurfaceSettings { objective, chi2_target: self.chi2_target, field: Some(field) }
     }
 

@@ -12,15 +12,18 @@ pub mod target;
 
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::Known;
+pub use crate::surface::evolving_map::Assumed;
+use crate::surface::evolving_map::NoFit;
 use crate::surface::evolving_map::star::coarsely;
-use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::imaging::Imager;
+
 use events::{ByHand, Events};
 use star::MeasuredStar;
 
 /// What the profiles say of the numbers of the star that are `fitted`, and of events, where these are looked for.
 /// Flares would be taken for regions, and regions for flares: events are found with plain spots first, and anew with
-/// the star that is found without them. `report` is told what is under way.
+/// the star that is found without them. With them goes the field from which a fit with finer maps begins. `report` is
+/// told what is under way.
 ///
 /// # Errors
 /// [`NoFit`].
@@ -30,7 +33,7 @@ pub fn found(
     known: &Known,
     (fitted, by_hand): (&[Parameter], Option<&[ByHand]>),
     report: &dyn Fn(&str),
-) -> Result<(Option<MeasuredStar>, Option<Events>), NoFit> {
+) -> Result<(Option<MeasuredStar>, Option<Events>, Assumed), NoFit> {
     let events = |imager: &Imager, near: Assumed| {
         report("looking for flares and other events");
         by_hand.map(|by_hand| Events::of(imager, values, known, near, by_hand)).transpose()
@@ -39,7 +42,7 @@ pub fn found(
     let mut plain = coarsely(imager, values, *known)?;
     let first = events(imager, plain.marginal.assumed)?;
     if fitted.is_empty() {
-        return Ok((None, first));
+        return Ok((None, first, plain.marginal.assumed));
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -51,5 +54,5 @@ pub fn found(
     let mut imager = imager.clone();
     star.put_into(&mut imager);
     let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-    Ok((Some(star), events))
+    Ok((Some(star), events, near))
 }

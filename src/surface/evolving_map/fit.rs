@@ -88,8 +88,9 @@ pub(in crate::surface) fn usual(
     Ok(Fitted::near(Marginal::new(imager, basis, design, values, assumed, near)?))
 }
 
-/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes; of
-/// many profiles from what a share of them says, whether the spectrum has a break included.
+/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
+/// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
+/// has a break included.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -104,8 +105,12 @@ pub fn fit(
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
-    let share = near.is_none().then(|| by_a_share(imager, basis, values, known)).flatten();
+    // the field that a fit begins from has or has no break
+    let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
+    let is_near = near.is_some() || begin.is_some();
+    let share = (!is_near).then(|| by_a_share(imager, basis, values, known)).flatten();
     let (first, hessian) = match (near, share) {
+        _ if begin.is_some() => (begin.expect("the field that it begins from"), None),
         (Some(Fitted { marginal, hessian, .. }), _) => {
             // maps of another orbit may be too far away
             let first = at(marginal.assumed, Some(marginal)).or_else(|_| at(marginal.assumed, None));
@@ -131,7 +136,7 @@ pub fn fit(
         }
     };
     let mut top = climb(first, &known, hessian, &at)?;
-    if near.is_none() && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
+    if !is_near && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
         top = with_or_without_break(top, &known, &at)?;
     }
     if known.jitter_kms.is_none() {

@@ -1,7 +1,7 @@
 //! What is known of the field before the data are asked, and the bounds of what is not.
 
 use super::{Assumed, Marginal};
-use crate::field::{Field, Lifetime, Spectrum};
+use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, Prior};
 use crate::planets::periodogram::ln_prior;
 use serde::{Deserialize, Serialize};
@@ -41,6 +41,9 @@ pub struct Known {
     /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
     /// in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
+    /// Where a fit begins: at a field that was found with coarser maps, instead of several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<Assumed>,
 }
 
 impl Known {
@@ -55,7 +58,24 @@ impl Known {
             jitter_kms: Some(jitter_kms),
             jitter_scale_kms: None,
             priors: [None; 3],
+            start: None,
         }
+    }
+
+    /// Where a fit begins, if not at several fields, what is known as it is.
+    pub(super) fn begin(&self) -> Option<Assumed> {
+        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = self.start?;
+        let spectrum = Spectrum {
+            amplitude: self.amplitude.unwrap_or(self.within(0, spectrum.amplitude)),
+            slope: self.slope.unwrap_or(self.within(1, spectrum.slope)),
+            break_degree: self.break_degree.unwrap_or(spectrum.break_degree),
+        };
+        let lifetime = self.lifetime.unwrap_or(match kernel.lifetime {
+            Lifetime::Days(days) => Lifetime::Days(self.within(2, days)),
+            Lifetime::Static => return None,
+        });
+        let field = Field { spectrum, kernel: Kernel::of(lifetime) };
+        Some(Assumed { field, jitter_kms: self.jitter_kms.unwrap_or(jitter_kms) })
     }
 
     /// Degree below which the spectrum is flat where a search starts: a slope that is given is that of a power law all

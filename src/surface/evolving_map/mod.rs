@@ -53,6 +53,7 @@ use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectru
 use crate::model::{FieldValues, Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
 /// Mean of the field: the spot filling factor of a star of which nothing else is known. Profiles do not tell it.
@@ -66,7 +67,7 @@ pub const DEGREE: usize = 36;
 const JITTERED: usize = 2;
 
 /// What is assumed before the data, beside the parameters of star and orbit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Assumed {
     /// The spots.
     pub field: Field,

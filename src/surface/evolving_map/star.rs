@@ -23,7 +23,7 @@ const GAIN: f64 = 1.0;
 const STEPS: usize = 12;
 
 /// So many steps with all profiles follow those with a share of them.
-const LAST_STEPS: usize = 3;
+const LAST_STEPS: usize = 2;
 
 /// Numbers of a climb that are not the star's: ln amplitude, slope, ln lifetime and ln jitter of the field, ln size of
 /// what is wrong alike in all profiles.
@@ -328,8 +328,8 @@ impl<'a> Climb<'a> {
         Ok(bend)
     }
 
-    /// The gradient, by differences over steps that change the height by some half: central ones, which give minus the
-    /// second derivatives along each number, too, or one-sided ones where these are known well.
+    /// The gradient, by differences over steps that change the height by some half: one-sided ones, or along numbers of
+    /// the field central ones, which give minus the second derivatives, too.
     fn gradient(&self, at: &Point, bend: &DMatrix<f64>, central: bool) -> (DVector<f64>, DVector<f64>) {
         let along = |i: usize| {
             if !self.is_free(i) {
@@ -343,7 +343,7 @@ impl<'a> Climb<'a> {
                 (moved != 0.0).then(|| self.at(&place, &at.marginal).ok().map(|there| (moved, there.height)))?
             };
             let above = beside(h);
-            let below = if central || above.is_none() { beside(-h) } else { None };
+            let below = if central && i < OF_FIELD || above.is_none() { beside(-h) } else { None };
             match (above, below) {
                 (Some((up, above)), Some((down, below))) => {
                     let (a, b) = ((above - at.height) / up, (below - at.height) / down);
@@ -373,7 +373,7 @@ impl<'a> Climb<'a> {
         let mut damping = DAMPING;
         bend = self.with_field(&here, &of_field)?;
         let mut learnt = false;
-        for _ in 0..steps {
+        for step in 1..=steps {
             let pushes = |i: usize| {
                 let (low, high) = self.limits[i];
                 (here.place[i] <= low + 1e-9 && gradient[i] < 0.0)
@@ -423,6 +423,9 @@ impl<'a> Climb<'a> {
             let corner = (OF_FIELD, OF_FIELD);
             let size = (count - OF_FIELD, count - OF_FIELD);
             bend.view_mut(corner, size).copy_from(&of_star.view(corner, size));
+            if step == steps {
+                break;
+            }
             let there = self.gradient(&here, &bend, false).0;
             let (bent, before) = (&gradient - &there, &bend * &moved);
             if moved.dot(&bent) > 0.1 * moved.dot(&before) {

@@ -335,6 +335,7 @@ impl Settings {
                 days => number(2, days).map(Lifetime::Days),
             },
             priors,
+            start: None,
             jitter_kms: self.velocity_jitter.number(),
             jitter_scale_kms: self.stability_kms.map(|scale| scale.max(BEST_STABILITY_KMS)),
         }
