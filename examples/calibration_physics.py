@@ -88,7 +88,7 @@ def results(out, truth):
     line |= {"false_alarm": found["false_alarm"]["probability"], "delta_ln_l": best["delta_ln_l"]}
     line |= {key: best[key] for key in ("period_d", "sigma_period_d", "k_kms", "sigma_k_kms")}
     line |= {key: field[key] for key in COLUMNS if key in field}
-    shares = verdict["periods"]
+    shares = verdict.get("periods", [])
     line["share"] = max((each["share"] for each in shares), default=1.0)
     period_d = truth["porb_over_prot"] * truth["prot"]
     alike = [each["share"] for each in shares if same(each["period_d"], period_d, line["season_d"])]

@@ -62,15 +62,15 @@ pub struct Told {
 }
 
 impl Compressed {
-    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
-    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers), both with a
+    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`,
+    /// and that is `sharing` what it has in common with so many; its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers), both with a
     /// row of zeros where the model is divided by anything. `None` where the covariance of the noise has no Cholesky
     /// factor.
     pub fn new(
         epoch: &Epoch,
         around: DVectorView<f64>,
         sd: &[f64],
-        how: Compression,
+        (how, sharing): (Compression, usize),
     ) -> Option<(Self, [DMatrix<f64>; 2])> {
         let factor = epoch.noise().cholesky()?.unpack();
         let n = epoch.len();
@@ -79,10 +79,13 @@ impl Compressed {
         let mut directions = DMatrix::identity(n, n);
         if how.left_out > 0.0 && n > 0 {
             let variances: Vec<f64> = sd.iter().map(|sd| sd * sd).collect();
-            directions = leading_directions(&whiten * epoch.jacobian.covariance(&variances) * whiten.transpose(), how)?;
+            let mut covariance = &whiten * epoch.jacobian.covariance(&variances) * whiten.transpose();
+            if common.ncols() > 0 {
+                covariance.gemm(sharing as f64, &common, &common.transpose(), 1.0);
+            }
+            directions = leading_directions(covariance, how)?;
             directions = with_directions(directions, &(&whiten * &epoch.misfit));
             directions = with_directions(directions, &(&whiten * &epoch.slopes));
-            directions = with_directions(directions, &common);
             common = directions.tr_mul(&common);
         }
         let numbers = directions.ncols() + usize::from(!epoch.divisor.is_empty());

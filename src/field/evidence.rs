@@ -77,11 +77,12 @@ impl Evidence {
         field.check()?;
         assert_eq!(around.shape(), (degrees.len(), epochs.len()), "coefficients of all epochs");
         let sd: Vec<f64> = field.spectrum.variances(degrees).into_iter().map(f64::sqrt).collect();
+        let sharing = epochs.iter().filter(|epoch| epoch.common.ncols() > 0).count();
         let compressed = epochs.iter().enumerate().map(|(k, epoch)| {
             epoch.check_shapes(degrees.len());
             let sound = epoch.is_sound() && around.column(k).iter().all(|c| c.is_finite());
             sound
-                .then(|| Compressed::new(epoch, around.column(k), &sd, how))
+                .then(|| Compressed::new(epoch, around.column(k), &sd, (how, sharing)))
                 .flatten()
                 .ok_or(FieldError::NotFinite { epoch: k })
         });
