@@ -62,10 +62,10 @@ pub struct Told {
 }
 
 impl Compressed {
-    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`,
-    /// and that is `sharing` what it has in common with so many; its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers), both with a
-    /// row of zeros where the model is divided by anything. `None` where the covariance of the noise has no Cholesky
-    /// factor.
+    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
+    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers), both with a
+    /// row of zeros where the model is divided by anything. As many epochs as are `sharing` that lose of it together.
+    /// `None` where the covariance of the noise has no Cholesky factor.
     pub fn new(
         epoch: &Epoch,
         around: DVectorView<f64>,

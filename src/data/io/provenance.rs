@@ -2,7 +2,7 @@
 
 use crate::numerics::json::Part;
 use crate::surface::ConstantVelocity;
-use crate::surface::calibration::Assumed;
+use crate::surface::calibration::FieldStart;
 use crate::surface::calibration::events::Events;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
@@ -59,7 +59,7 @@ pub struct Measured {
     pub events: Option<Events>,
     /// The field of spots that was fitted on the way to star and events, from which a fit with finer maps begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub field_start: Option<Assumed>,
+    pub field_start: Option<FieldStart>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
