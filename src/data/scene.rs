@@ -14,11 +14,11 @@ use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::{Observations, Profile};
-use crate::surface::calibration;
 use crate::surface::calibration::events::{ByHand, Events};
 use crate::surface::calibration::star::MeasuredStar;
+use crate::surface::calibration::{self, Asked, FoundStar};
 use crate::surface::expansion::nuisances;
-use crate::surface::imaging::Imager;
+use crate::surface::imaging::{Drift, Imager};
 use crate::surface::{At, Known, NoMaps, SurfaceMaps, SurfaceSettings};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -122,9 +122,12 @@ impl Scene {
             return self;
         }
         let (known, values) = (self.settings.known_field(), self.settings.values);
-        match calibration::found(&self.imager, values, &known, (&fitted, by_hand.as_deref()), report) {
-            Ok((star, events, near)) => {
-                self.with_found(&Measured { star, events, field_start: Some(near), ..Measured::default() })
+        let (nuisances, slope) = (nuisances(&self.settings.free), self.settings.drift.is_none());
+        let asked = Asked { fitted: &fitted, events: by_hand.as_deref(), slope, nuisances: &nuisances };
+        match calibration::found(&self.imager, values, &known, asked, report) {
+            Ok(FoundStar { star, events, has_slope, field }) => {
+                let (field_start, drift) = (Some(field), has_slope);
+                self.with_found(&Measured { star, events, drift, field_start, ..Measured::default() })
             }
             Err(error) => {
                 self.measured.profiles.push(format!("star and outliers not fitted: {error}"));
@@ -157,10 +160,19 @@ impl Scene {
             None => self,
         };
         scene.measured.field_start = scene.measured.field_start.or(found.field_start);
+        scene = scene.with_drift(found.drift);
         match &found.events {
             Some(events) if scene.measured.events.is_none() => scene.with_events(events.clone()),
             _ => scene,
         }
+    }
+
+    /// The same with a drift that was found.
+    fn with_drift(mut self, found: bool) -> Self {
+        if found {
+            (self.imager.drift, self.measured.drift) = (Some(Drift { curved: false }), true);
+        }
+        self
     }
 
     /// The same with larger errors of profiles that are events.
@@ -205,8 +217,9 @@ impl Scene {
         let (measured, imager) = (measured.clone(), imager.clone());
         let sha256 = self.data_sha256.clone();
         let before = Calibrated { observations, sha256, measured, chi2_target: *chi2_target, imager };
-        let star = self.measured.star.clone();
-        let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?);
+        let (star, drift) = (self.measured.star.clone(), self.measured.drift);
+        let scene =
+            Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?).with_drift(drift);
         Ok(match star {
             Some(star) => scene.with_star(star),
             None => scene,

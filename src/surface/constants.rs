@@ -3,10 +3,11 @@
 
 use super::Linearised;
 use super::expansion::Nuisance;
-use super::imaging::{DriftOf, Imager};
+use super::imaging::{Drift, DriftOf, Imager};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::{Common, common_velocities};
+use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,28 @@ pub struct FoundDrift {
 
 /// A drift of so many standard errors is one.
 const SIGNIFICANT: f64 = 4.0;
+
+/// Whether velocities of this quadratic, with RV offsets and systemic velocity held at `vsys_kms`, have a slope that is
+/// significant beside no orbit.
+pub(super) fn have_slope(held: &VelocityQuadratic, imager: &Imager, nuisances: &[Nuisance], vsys_kms: f64) -> bool {
+    let with_slope = Imager { drift: Some(Drift { curved: false }), ..imager.clone() };
+    let (_, all) = commons(&with_slope, nuisances, vsys_kms, held.len());
+    let slopes = all.len() - with_slope.drifts().len();
+    let Some((values, sigmas)) = common_velocities(held, &all, None) else { return false };
+    values.iter().zip(&sigmas).skip(slopes).any(|(kms, sigma)| kms.abs() > SIGNIFICANT * sigma)
+}
+
+/// The systemic velocity, where it is among the `nuisances`, and whether it is; then all other velocities that so many
+/// profiles have in common.
+fn commons(imager: &Imager, nuisances: &[Nuisance], vsys_kms: f64, n: usize) -> (bool, Vec<Common>) {
+    let systemic = nuisances.iter().find(|nuisance| nuisance.parameter == Parameter::Vsys);
+    let systemic = systemic.map(|prior| Common {
+        of_each: DVector::from_element(n, 1.0),
+        mean_kms: prior.mean - vsys_kms,
+        sd_kms: prior.sd,
+    });
+    (systemic.is_some(), systemic.into_iter().chain(imager.common_velocities(n)).collect())
+}
 
 impl FoundDrift {
     /// In units of its error.
@@ -74,14 +97,7 @@ impl Linearised {
     pub fn constants(&self, imager: &Imager, nuisances: &[Nuisance], peak: Option<&Peak>) -> Option<Constants> {
         let n = self.held.len();
         let vsys_kms = self.expansion.values[Parameter::Vsys];
-        let systemic = nuisances.iter().find(|nuisance| nuisance.parameter == Parameter::Vsys);
-        let systemic = systemic.map(|prior| Common {
-            of_each: DVector::from_element(n, 1.0),
-            mean_kms: prior.mean - vsys_kms,
-            sd_kms: prior.sd,
-        });
-        let is_free = systemic.is_some();
-        let all: Vec<Common> = systemic.into_iter().chain(imager.common_velocities(n)).collect();
+        let (is_free, all) = commons(imager, nuisances, vsys_kms, n);
         let (values, sigmas) = common_velocities(&self.held, &all, peak)?;
         // from where the expansion holds them
         let centres = is_free.then_some(vsys_kms).into_iter().chain(imager.zero_points.iter().map(|z| z.held_kms()));

@@ -104,7 +104,6 @@ fn keys_that_make_no_sense_are_refused() {
 fn a_drift_is_told_with_its_error() {
     let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
     config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
-    config["star"]["velocity_drift"] = json!("linear");
     config["sampler"]["walkers"] = json!(12);
     config["parameters"]["vsys_kms"] = json!({ "prior": "uniform", "min": -1, "max": 1 });
     desk.write(CONFIG, &config.to_string());

@@ -50,8 +50,8 @@ pub fn imager(
         imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
     }
     imager.drift = match settings.drift {
-        VelocityDrift::None => None,
-        drift => Some(Drift { curved: drift == VelocityDrift::Quadratic }),
+        None | Some(VelocityDrift::None) => None,
+        Some(drift) => Some(Drift { curved: drift == VelocityDrift::Quadratic }),
     };
     for (set, DataSetSettings { zero_point, .. }) in sets.iter().enumerate() {
         match *zero_point {

@@ -157,6 +157,9 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
     let stands_in = field.is_some_and(|field| field.stands_in().is_some());
     if poor || stands_in || field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
         trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| poor || diagnosis.reason != Reason::Errors);
+    } else if field.and_then(|f| f.spot_lifetime_d).is_some_and(|d| d < scene.imager.star.rotation_period_d) {
+        // spots that do not live for a rotation fit anything, a second star included
+        trial.diagnosis = Diagnosis::at_sight(&scene).filter(|seen| seen.reason == Reason::DoubleLines);
     }
     trial.star = scene.measured.star.as_ref().map(MeasuredStar::line);
     trial.warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().collect();

@@ -57,6 +57,9 @@ pub struct Measured {
     /// `observations.events`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub events: Option<Events>,
+    /// `star.velocity_drift`: whether the profiles show a slope of the velocities.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub drift: bool,
     /// The field of spots that was fitted on the way to star and events, from which a fit with finer maps begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_start: Option<FieldStart>,

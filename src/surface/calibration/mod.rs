@@ -13,8 +13,9 @@ pub mod target;
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::Known;
-use crate::surface::evolving_map::star::coarsely;
+use crate::surface::evolving_map::star::{coarsely, have_slope};
 use crate::surface::evolving_map::{Assumed, NoFit};
+use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
 use events::{ByHand, Events};
 use serde::{Deserialize, Serialize};
@@ -57,10 +58,34 @@ impl FieldStart {
     }
 }
 
-/// What the profiles say of the numbers of the star that are `fitted`, and of events, where these are looked for.
-/// Flares would be taken for regions, and regions for flares: events are found with plain spots first, and anew with
-/// the star that is found without them. With them goes the field from which a fit with finer maps begins. `report` is
-/// told what is under way.
+/// What is to be asked of the profiles before maps and searches.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// Numbers of the star.
+    pub fitted: &'a [Parameter],
+    /// Events, with what is known of each profile.
+    pub events: Option<&'a [ByHand]>,
+    /// Whether the velocities have a slope.
+    pub slope: bool,
+    /// Parameters that are integrated out.
+    pub nuisances: &'a [Nuisance],
+}
+
+/// What they say.
+#[derive(Clone, Debug)]
+pub struct FoundStar {
+    /// Line and active regions, where they are fitted.
+    pub star: Option<MeasuredStar>,
+    /// Events, where they are looked for.
+    pub events: Option<Events>,
+    /// Whether the velocities have a slope.
+    pub has_slope: bool,
+    /// Where a fit with finer maps begins.
+    pub field: FieldStart,
+}
+
+/// What the profiles say of all that is `asked`. Flares would be taken for regions, and regions for flares: events are
+/// found with plain spots first, and anew with the star that is found without them. `report` is told what is under way.
 ///
 /// # Errors
 /// [`NoFit`].
@@ -68,18 +93,20 @@ pub fn found(
     imager: &Imager,
     values: ParameterValues,
     known: &Known,
-    (fitted, by_hand): (&[Parameter], Option<&[ByHand]>),
+    asked: Asked,
     report: &dyn Fn(&str),
-) -> Result<(Option<MeasuredStar>, Option<Events>, FieldStart), NoFit> {
+) -> Result<FoundStar, NoFit> {
     let events = |imager: &Imager, near: Assumed| {
         report("looking for flares and other events");
-        by_hand.map(|by_hand| Events::of(imager, values, known, near, by_hand)).transpose()
+        asked.events.map(|by_hand| Events::of(imager, values, known, near, by_hand)).transpose()
     };
     report("fitting active regions");
     let mut plain = coarsely(imager, values, *known)?;
+    let has_slope = asked.slope && have_slope(imager, &plain, asked.nuisances)?;
     let first = events(imager, plain.marginal.assumed)?;
-    if fitted.is_empty() {
-        return Ok((None, first, plain.marginal.assumed.into()));
+    if asked.fitted.is_empty() {
+        let field = plain.marginal.assumed.into();
+        return Ok(FoundStar { star: None, events: first, has_slope, field });
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -87,9 +114,9 @@ pub fn found(
         plain = coarsely(&without, values, *known)?;
     }
     report("fitting active regions");
-    let (star, near) = MeasuredStar::of(&without, &plain, known, fitted)?;
+    let (star, near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
     let mut imager = imager.clone();
     star.put_into(&mut imager);
     let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-    Ok((Some(star), events, near.into()))
+    Ok(FoundStar { star: Some(star), events, has_slope, field: near.into() })
 }

@@ -10,6 +10,8 @@ use super::fit::{fit, share_of};
 use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::field::FieldError;
 use crate::model::{Parameter, ParameterValues};
+use crate::surface::constants;
+use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector, Vector4};
 use rayon::prelude::*;
@@ -117,6 +119,16 @@ struct Climb<'a> {
 pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
     values.set(Parameter::K, 0.0);
     fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
+}
+
+/// Whether the velocities of the star, by its field `near`, have a slope, beside no orbit.
+///
+/// # Errors
+/// [`FieldError`].
+pub fn have_slope(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<bool, FieldError> {
+    let (marginal, basis) = (&near.marginal, Basis::coarse(&imager.grid, DEGREE));
+    let held = marginal.known_zero_points(imager, &basis, &[])?.velocities(&[]);
+    Ok(constants::have_slope(&held, imager, nuisances, marginal.values[Parameter::Vsys]))
 }
 
 /// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
@@ -328,8 +340,8 @@ impl<'a> Climb<'a> {
         Ok(bend)
     }
 
-    /// The gradient, by differences over steps that change the height by some half: one-sided ones, or along numbers of
-    /// the field central ones, which give minus the second derivatives, too.
+    /// The gradient, by differences over steps that change the height by some half: central ones, which give minus the
+    /// second derivatives along each number, too, or one-sided ones where these are known well.
     fn gradient(&self, at: &Point, bend: &DMatrix<f64>, central: bool) -> (DVector<f64>, DVector<f64>) {
         let along = |i: usize| {
             if !self.is_free(i) {
@@ -343,7 +355,7 @@ impl<'a> Climb<'a> {
                 (moved != 0.0).then(|| self.at(&place, &at.marginal).ok().map(|there| (moved, there.height)))?
             };
             let above = beside(h);
-            let below = if central && i < OF_FIELD || above.is_none() { beside(-h) } else { None };
+            let below = if central || above.is_none() { beside(-h) } else { None };
             match (above, below) {
                 (Some((up, above)), Some((down, below))) => {
                     let (a, b) = ((above - at.height) / up, (below - at.height) / down);

@@ -68,8 +68,8 @@ pub struct Settings {
     pub sampler: SamplerSettings,
     /// Numbers of the star that are fitted to the profiles.
     pub fitted: Vec<Parameter>,
-    /// A drift of the velocities that is integrated out.
-    pub drift: VelocityDrift,
+    /// A drift of the velocities that is integrated out; `None` where the profiles are to say whether there is one.
+    pub drift: Option<VelocityDrift>,
     /// The landscape.
     pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
@@ -111,8 +111,8 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         false => Vec::new(),
     };
     let drift = match (written.star.velocity_drift, written.imaging.objective.properties().has_field) {
-        (given, true) => given.unwrap_or(VelocityDrift::Linear),
-        (None | Some(VelocityDrift::None), false) => VelocityDrift::None,
+        (given, true) => given,
+        (None | Some(VelocityDrift::None), false) => Some(VelocityDrift::None),
         (Some(_), false) => {
             let problem = "no effect but with imaging.objective \"marginal-likelihood\"";
             return Err(Fault::new("star.velocity_drift", problem));

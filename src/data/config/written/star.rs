@@ -57,8 +57,8 @@ pub struct Star<Period = f64> {
     /// "limb_darkening".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<String>,
-    /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood", and
-    /// then "linear" if not given.
+    /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood". If not
+    /// given, "linear" where the profiles show a slope of 4 standard errors without a planet, and otherwise "none".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_drift: Option<VelocityDrift>,
     /// Active regions: their line and limb contrast. Fitted if not given, with objective "marginal-likelihood";
