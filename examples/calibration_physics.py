@@ -40,8 +40,7 @@ COLUMNS = (
 
 
 def with_setting(config, setting):
-    """The config of a setting."""
-    config = json.loads(json.dumps(config))
+    """The config of a setting, in place of that of `init`."""
     if setting == "stable":
         config["observations"]["velocity_jitter_kms"] = 0.0
     if setting == "wrong-line":
@@ -91,8 +90,8 @@ def results(out, truth):
     shares = verdict.get("periods", [])
     line["share"] = max((each["share"] for each in shares), default=1.0)
     period_d = truth["porb_over_prot"] * truth["prot"]
-    alike = [each["share"] for each in shares if same(each["period_d"], period_d, line["season_d"])]
-    line["true_share"] = sum(alike) if shares else float(same(best["period_d"], period_d, line["season_d"]))
+    is_true = lambda one: calibration_table.same(one["period_d"], period_d, line["season_d"])
+    line["true_share"] = sum(one["share"] for one in shares if is_true(one)) if shares else float(is_true(best))
     line["median_sigma_k_kms"] = calibration_table.median_sigma(searched["porb_over_prot"], searched["sigma_k_kms"])
     measured = found["measured"]
     events = (measured.get("events") or {}).get("profiles", [])
@@ -106,17 +105,13 @@ def results(out, truth):
     return line | {"against": "; ".join(verdict["against"]), "warnings": "; ".join(found["warnings"])}
 
 
-def same(period_d, truth_d, season_d):
-    return abs(1 / period_d - 1 / truth_d) < calibration_table.RIGHT / season_d
-
-
 def run(args):
     args.work.mkdir(parents=True, exist_ok=True)
     done = {key(row) for row in calibration_table.resumed(args.csv)}
     for number in range(args.first, args.first + args.seeds):
         for planet in (False, True):
             for effect in args.effects:
-                for setting in ("default", "stable") if effect == "none" else ("default",):
+                for setting in SETTINGS if effect == "none" else SETTINGS[:1]:
                     if (effect, str(number), str(int(planet)), setting) not in done:
                         calibration_table.append(args.csv, COLUMNS, one(effect, number, planet, setting, args))
 
@@ -130,8 +125,10 @@ def median(values):
     return float(np.median(values)) if values else math.nan
 
 
-def period_d(row):
-    return row["true_porb_over_prot"] * row["rotation_period_d"]
+def is_right(row):
+    """Whether the period is the true one."""
+    truth_d = row["true_porb_over_prot"] * row["rotation_period_d"]
+    return calibration_table.same(row["period_d"], truth_d, row["season_d"])
 
 
 def ratios(rows, others):
@@ -164,7 +161,7 @@ def planets_found(planets, without):
     for name, group in groups(planets):
         if group:
             hits = [row for row in group if row["false_alarm"] < calibration_table.FOUND]
-            right = sum(same(row["period_d"], period_d(row), row["season_d"]) for row in hits)
+            right = sum(map(is_right, hits))
             ambiguous = sum(row["true_share"] > 0 for row in hits) - right
             alike = group + [row for row in without if name in ("all", row["effect"])]
             sigma = f"{1000 * median(row['median_sigma_k_kms'] for row in alike):.1f}"
@@ -186,7 +183,7 @@ def settings(rows):
         ratio = ratios(of, default)
         if ratio:
             values = [row["false_alarm"] for row in of if not row["planet"]]
-            right = [row for row in of if row["planet"] and same(row["period_d"], period_d(row), row["season_d"])]
+            right = [row for row in of if row["planet"] and is_right(row)]
             pulls = [(row["k_kms"] - PLANET_KMS) / row["sigma_k_kms"] for row in right]
             inside = [sum(abs(pull) < bound for pull in pulls) for bound in (1, 2)]
             spread = f"{min(ratio):.2f} to {max(ratio):.2f}"

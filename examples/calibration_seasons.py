@@ -147,8 +147,8 @@ def inside(row, name, level):
 
 def right(row):
     """Whether the period is the true one, as far as a season tells."""
-    found, truth = row["porb_over_prot_median"], row["porb_over_prot_true"]
-    return abs(1 / found - 1 / truth) / ROTATION_D < calibration_table.RIGHT / NIGHTS
+    periods = (row["porb_over_prot_median"], row["porb_over_prot_true"])
+    return calibration_table.same(*(period * ROTATION_D for period in periods), NIGHTS)
 
 
 def table(args):

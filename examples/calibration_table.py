@@ -111,10 +111,15 @@ def found(row, how):
     return of(row, how, "false_alarm") < FOUND
 
 
+def same(period_d, true_d, season_d):
+    """Whether a period is the true one, as far as a season tells."""
+    return abs(1 / period_d - 1 / true_d) < RIGHT / season_d
+
+
 def right(row, how):
     """Whether the period found is the true one."""
-    apart = abs(1 / of(row, how, "porb_over_prot") - 1 / row["true_porb_over_prot"]) / row["rotation_period_d"]
-    return apart < RIGHT / row["season_d"]
+    periods = (of(row, how, "porb_over_prot"), row["true_porb_over_prot"])
+    return same(*(period * row["rotation_period_d"] for period in periods), row["season_d"])
 
 
 def share(hits):

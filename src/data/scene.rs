@@ -243,8 +243,7 @@ impl Scene {
     #[doc(hidden)]
     pub fn surface(&self) -> SurfaceSettings {
         let objective = self.settings.imaging.objective;
-        let field =
-            Known { start: self.measured.field_start.map(|start| start.assumed()), ..self.settings.known_field() };
+        let field = Known { start: self.measured.field_start, ..self.settings.known_field() };
         SurfaceSettings { objective, chi2_target: self.chi2_target, field: Some(field) }
     }
 

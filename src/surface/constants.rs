@@ -40,9 +40,9 @@ const SIGNIFICANT: f64 = 4.0;
 pub(super) fn have_slope(held: &VelocityQuadratic, imager: &Imager, nuisances: &[Nuisance], vsys_kms: f64) -> bool {
     let with_slope = Imager { drift: Some(Drift { curved: false }), ..imager.clone() };
     let (_, all) = commons(&with_slope, nuisances, vsys_kms, held.len());
-    let slopes = all.len() - with_slope.drifts().len();
+    let first = all.len() - with_slope.drifts().len();
     let Some((values, sigmas)) = common_velocities(held, &all, None) else { return false };
-    values.iter().zip(&sigmas).skip(slopes).any(|(kms, sigma)| kms.abs() > SIGNIFICANT * sigma)
+    values.iter().zip(&sigmas).skip(first).any(|(kms, sigma)| kms.abs() > SIGNIFICANT * sigma)
 }
 
 /// The systemic velocity, where it is among the `nuisances`, and whether it is; then all other velocities that so many

@@ -1,14 +1,13 @@
 //! What every result says of where it came from.
 
 use crate::numerics::json::Part;
-use crate::surface::ConstantVelocity;
-use crate::surface::calibration::FieldStart;
 use crate::surface::calibration::events::Events;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::target::ChosenTarget;
+use crate::surface::{ConstantVelocity, FieldStart};
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.

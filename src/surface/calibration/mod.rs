@@ -10,53 +10,14 @@ pub mod offsets;
 pub mod star;
 pub mod target;
 
-use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, ParameterValues};
-use crate::surface::Known;
 use crate::surface::evolving_map::star::{coarsely, have_slope};
 use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
+use crate::surface::{FieldStart, Known};
 use events::{ByHand, Events};
-use serde::{Deserialize, Serialize};
 use star::MeasuredStar;
-
-/// A field of spots from which a fit with finer maps begins.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FieldStart {
-    /// Standard deviation of the filling factor.
-    pub spot_amplitude: f64,
-    /// Slope of its spectrum.
-    pub spot_slope: f64,
-    /// Degree below which the spectrum is flat.
-    pub spot_break_degree: f64,
-    /// Lifetime (d); null for static spots.
-    pub spot_lifetime_d: Option<f64>,
-    /// Velocity jitter (km/s).
-    pub velocity_jitter_kms: f64,
-}
-
-impl From<Assumed> for FieldStart {
-    fn from(Assumed { field: Field { spectrum, kernel }, jitter_kms }: Assumed) -> Self {
-        FieldStart {
-            spot_amplitude: spectrum.amplitude,
-            spot_slope: spectrum.slope,
-            spot_break_degree: spectrum.break_degree,
-            spot_lifetime_d: kernel.lifetime.days(),
-            velocity_jitter_kms: jitter_kms,
-        }
-    }
-}
-
-impl FieldStart {
-    /// What a fit begins from.
-    pub fn assumed(&self) -> Assumed {
-        let FieldStart { spot_amplitude, spot_slope, spot_break_degree, spot_lifetime_d, velocity_jitter_kms } = *self;
-        let spectrum = Spectrum { amplitude: spot_amplitude, slope: spot_slope, break_degree: spot_break_degree };
-        let kernel = Kernel::of(spot_lifetime_d.map_or(Lifetime::Static, Lifetime::Days));
-        Assumed { field: Field { spectrum, kernel }, jitter_kms: velocity_jitter_kms }
-    }
-}
 
 /// What is to be asked of the profiles before maps and searches.
 #[derive(Clone, Copy, Debug)]

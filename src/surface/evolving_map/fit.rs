@@ -109,15 +109,15 @@ pub fn fit(
     let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
     let is_near = near.is_some() || begin.is_some();
     let share = (!is_near).then(|| by_a_share(imager, basis, values, known)).flatten();
-    let (first, hessian) = match (near, share) {
-        _ if begin.is_some() => (begin.expect("the field that it begins from"), None),
-        (Some(Fitted { marginal, hessian, .. }), _) => {
+    let (first, hessian) = match (near, begin, share) {
+        (Some(Fitted { marginal, hessian, .. }), ..) => {
             // maps of another orbit may be too far away
             let first = at(marginal.assumed, Some(marginal)).or_else(|_| at(marginal.assumed, None));
             (first?, *hessian)
         }
-        (None, Some((assumed, hessian))) => (at(assumed, None)?, hessian),
-        (None, None) => {
+        (None, Some(begin), _) => (begin, None),
+        (None, None, Some((assumed, hessian))) => (at(assumed, None)?, hessian),
+        (None, None, None) => {
             let rough = basis.roughly();
             // of many profiles each is hundreds of megabytes: only the best so far is kept
             let higher = |best, next| higher(best, next, &known);

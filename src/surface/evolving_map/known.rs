@@ -43,7 +43,34 @@ pub struct Known {
     pub priors: [Option<Prior>; 3],
     /// Where a fit begins: at a field that was found with coarser maps, instead of several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub start: Option<Assumed>,
+    pub start: Option<FieldStart>,
+}
+
+/// A field of spots from which a fit with finer maps begins.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FieldStart {
+    /// Standard deviation of the filling factor.
+    pub spot_amplitude: f64,
+    /// Slope of its spectrum.
+    pub spot_slope: f64,
+    /// Degree below which the spectrum is flat.
+    pub spot_break_degree: f64,
+    /// Lifetime (d); null for static spots.
+    pub spot_lifetime_d: Option<f64>,
+    /// Velocity jitter (km/s).
+    pub velocity_jitter_kms: f64,
+}
+
+impl From<Assumed> for FieldStart {
+    fn from(Assumed { field: Field { spectrum, kernel }, jitter_kms }: Assumed) -> Self {
+        FieldStart {
+            spot_amplitude: spectrum.amplitude,
+            spot_slope: spectrum.slope,
+            spot_break_degree: spectrum.break_degree,
+            spot_lifetime_d: kernel.lifetime.days(),
+            velocity_jitter_kms: jitter_kms,
+        }
+    }
 }
 
 impl Known {
@@ -64,18 +91,18 @@ impl Known {
 
     /// Where a fit begins, if not at several fields, what is known as it is.
     pub(super) fn begin(&self) -> Option<Assumed> {
-        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = self.start?;
+        let start = self.start?;
         let spectrum = Spectrum {
-            amplitude: self.amplitude.unwrap_or(self.within(0, spectrum.amplitude)),
-            slope: self.slope.unwrap_or(self.within(1, spectrum.slope)),
-            break_degree: self.break_degree.unwrap_or(spectrum.break_degree),
+            amplitude: self.amplitude.unwrap_or(self.within(0, start.spot_amplitude)),
+            slope: self.slope.unwrap_or(self.within(1, start.spot_slope)),
+            break_degree: self.break_degree.unwrap_or(start.spot_break_degree),
         };
-        let lifetime = self.lifetime.unwrap_or(match kernel.lifetime {
-            Lifetime::Days(days) => Lifetime::Days(self.within(2, days)),
-            Lifetime::Static => return None,
-        });
+        let lifetime = match self.lifetime {
+            Some(lifetime) => lifetime,
+            None => Lifetime::Days(self.within(2, start.spot_lifetime_d?)),
+        };
         let field = Field { spectrum, kernel: Kernel::of(lifetime) };
-        Some(Assumed { field, jitter_kms: self.jitter_kms.unwrap_or(jitter_kms) })
+        Some(Assumed { field, jitter_kms: self.jitter_kms.unwrap_or(start.velocity_jitter_kms) })
     }
 
     /// Degree below which the spectrum is flat where a search starts: a slope that is given is that of a power law all

@@ -41,7 +41,7 @@ pub use change::Change;
 pub use design::Design;
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
-pub use known::{Known, LARGEST_AMPLITUDE};
+pub use known::{FieldStart, Known, LARGEST_AMPLITUDE};
 pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use planned::Planned;
@@ -53,7 +53,6 @@ use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectru
 use crate::model::{FieldValues, Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
 /// Mean of the field: the spot filling factor of a star of which nothing else is known. Profiles do not tell it.
@@ -67,7 +66,7 @@ pub const DEGREE: usize = 36;
 const JITTERED: usize = 2;
 
 /// What is assumed before the data, beside the parameters of star and orbit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Assumed {
     /// The spots.
     pub field: Field,
