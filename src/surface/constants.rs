@@ -32,17 +32,20 @@ pub struct FoundDrift {
     pub data_set: Option<usize>,
 }
 
-/// A drift of so many standard errors is one.
+/// A drift of so many standard errors is a finding.
 const SIGNIFICANT: f64 = 4.0;
 
+/// A slope of so many standard errors beside no orbit is integrated out: a planet makes the errors larger.
+const INTEGRATED: f64 = 3.0;
+
 /// Whether velocities of this quadratic, with RV offsets and systemic velocity held at `vsys_kms`, have a slope that is
-/// significant beside no orbit.
+/// to be integrated out.
 pub(super) fn have_slope(held: &VelocityQuadratic, imager: &Imager, nuisances: &[Nuisance], vsys_kms: f64) -> bool {
     let with_slope = Imager { drift: Some(Drift { curved: false }), ..imager.clone() };
     let (_, all) = commons(&with_slope, nuisances, vsys_kms, held.len());
     let first = all.len() - with_slope.drifts().len();
     let Some((values, sigmas)) = common_velocities(held, &all, None) else { return false };
-    values.iter().zip(&sigmas).skip(first).any(|(kms, sigma)| kms.abs() > SIGNIFICANT * sigma)
+    values.iter().zip(&sigmas).skip(first).any(|(kms, sigma)| kms.abs() > INTEGRATED * sigma)
 }
 
 /// The systemic velocity, where it is among the `nuisances`, and whether it is; then all other velocities that so many

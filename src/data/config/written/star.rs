@@ -58,7 +58,7 @@ pub struct Star<Period = f64> {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<String>,
     /// Velocity drift (outer companion or spectrograph), marginalised over with objective "marginal-likelihood". If not
-    /// given, "linear" where the profiles show a slope of 4 standard errors without a planet, and otherwise "none".
+    /// given, "linear" where the profiles show a slope of 3 standard errors without a planet, and otherwise "none".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_drift: Option<VelocityDrift>,
     /// Active regions: their line and limb contrast. Fitted if not given, with objective "marginal-likelihood";
