@@ -18,7 +18,7 @@ use crate::surface::calibration::events::{ByHand, Events};
 use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::{self, Asked, FoundStar};
 use crate::surface::expansion::nuisances;
-use crate::surface::imaging::{Drift, Imager};
+use crate::surface::imaging::Imager;
 use crate::surface::{At, Known, NoMaps, SurfaceMaps, SurfaceSettings};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -125,9 +125,9 @@ impl Scene {
         let (nuisances, slope) = (nuisances(&self.settings.free), self.settings.drift.is_none());
         let asked = Asked { fitted: &fitted, events: by_hand.as_deref(), slope, nuisances: &nuisances };
         match calibration::found(&self.imager, values, &known, asked, report) {
-            Ok(FoundStar { star, events, has_slope, field }) => {
-                let (field_start, drift) = (Some(field), has_slope);
-                self.with_found(&Measured { star, events, drift, field_start, ..Measured::default() })
+            Ok(FoundStar { star, events, drift_kms_d, field }) => {
+                let field_start = Some(field);
+                self.with_found(&Measured { star, events, drift_kms_d, field_start, ..Measured::default() })
             }
             Err(error) => {
                 self.measured.profiles.push(format!("star and outliers not fitted: {error}"));
@@ -160,17 +160,23 @@ impl Scene {
             None => self,
         };
         scene.measured.field_start = scene.measured.field_start.or(found.field_start);
-        scene = scene.with_drift(found.drift);
+        if scene.measured.drift_kms_d.is_empty() {
+            scene = scene.with_drift(&found.drift_kms_d);
+        }
         match &found.events {
             Some(events) if scene.measured.events.is_none() => scene.with_events(events.clone()),
             _ => scene,
         }
     }
 
-    /// The same with a drift that was found.
-    fn with_drift(mut self, found: bool) -> Self {
-        if found {
-            (self.imager.drift, self.measured.drift) = (Some(Drift { curved: false }), true);
+    /// The same with drifts held at slopes that were found.
+    fn with_drift(mut self, kms_d: &[f64]) -> Self {
+        if !kms_d.is_empty() {
+            if self.imager.drifts.is_empty() {
+                self.imager = self.imager.with_drifts(false);
+            }
+            self.imager.hold_drifts(kms_d);
+            self.measured.drift_kms_d = kms_d.to_vec();
         }
         self
     }
@@ -217,9 +223,9 @@ impl Scene {
         let (measured, imager) = (measured.clone(), imager.clone());
         let sha256 = self.data_sha256.clone();
         let before = Calibrated { observations, sha256, measured, chi2_target: *chi2_target, imager };
-        let (star, drift) = (self.measured.star.clone(), self.measured.drift);
-        let scene =
-            Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?).with_drift(drift);
+        let Measured { star, drift_kms_d, .. } = self.measured.clone();
+        let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?);
+        let scene = scene.with_drift(&drift_kms_d);
         Ok(match star {
             Some(star) => scene.with_star(star),
             None => scene,

@@ -3,7 +3,7 @@
 
 use super::Linearised;
 use super::expansion::Nuisance;
-use super::imaging::{Drift, DriftOf, Imager};
+use super::imaging::{Drift, Imager};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::{Common, common_velocities};
@@ -38,14 +38,31 @@ const SIGNIFICANT: f64 = 4.0;
 /// A slope of so many standard errors beside no orbit is integrated out: a planet makes the errors larger.
 const INTEGRATED: f64 = 3.0;
 
-/// Whether velocities of this quadratic, with RV offsets and systemic velocity held at `vsys_kms`, have a slope that is
-/// to be integrated out.
-pub(super) fn have_slope(held: &VelocityQuadratic, imager: &Imager, nuisances: &[Nuisance], vsys_kms: f64) -> bool {
-    let with_slope = Imager { drift: Some(Drift { curved: false }), ..imager.clone() };
-    let (_, all) = commons(&with_slope, nuisances, vsys_kms, held.len());
-    let first = all.len() - with_slope.drifts().len();
-    let Some((values, sigmas)) = common_velocities(held, &all, None) else { return false };
-    values.iter().zip(&sigmas).skip(first).any(|(kms, sigma)| kms.abs() > INTEGRATED * sigma)
+/// The slope of each drift of `imager` (km/s per day) by velocities of this quadratic beside no orbit, RV offsets and
+/// systemic velocity free as the `nuisances` say, held at `vsys_kms`; and whether one is so steep that it is to be
+/// integrated out. `None` where they are not bounded.
+pub(super) fn slopes(
+    held: &VelocityQuadratic,
+    imager: &Imager,
+    nuisances: &[Nuisance],
+    vsys_kms: f64,
+) -> Option<(Vec<f64>, bool)> {
+    let (_, all) = commons(imager, nuisances, vsys_kms, held.len());
+    let (values, sigmas) = common_velocities(held, &all, None)?;
+    let found = found_drifts(imager, all.len(), &values, &sigmas);
+    let is_steep = found.iter().any(|drift| drift.sigmas() > INTEGRATED);
+    Some((found.iter().map(|drift| drift.kms_d).collect(), is_steep))
+}
+
+/// The drifts of `imager`, their terms the last among so many common velocities of these `values`.
+fn found_drifts(imager: &Imager, commons: usize, values: &DVector<f64>, sigmas: &DVector<f64>) -> Vec<FoundDrift> {
+    let mut term = commons - imager.drifts.iter().map(Drift::terms).sum::<usize>();
+    let slope = |drift: &Drift| {
+        let [kms_d, sigma_kms_d] = [values[term], sigmas[term]].map(|kms| kms / drift.half_span_d);
+        term += drift.terms();
+        FoundDrift { kms_d: drift.held_kms_d + kms_d, sigma_kms_d, data_set: drift.set.map(|set| set + 1) }
+    };
+    imager.drifts.iter().map(slope).collect()
 }
 
 /// The systemic velocity, where it is among the `nuisances`, and whether it is; then all other velocities that so many
@@ -107,16 +124,8 @@ impl Linearised {
         let found = centres.zip(values.iter().zip(&sigmas));
         let mut found = found.map(|(at, (value, sigma))| ConstantVelocity { value_kms: at + value, sigma_kms: *sigma });
         let of_each = |sum: DVector<f64>, (common, value): (&Common, &f64)| sum + *value * &common.of_each;
-        let constant = usize::from(is_free) + imager.zero_points.len();
-        let terms = imager.drift.map_or(1, |drift| drift.terms());
-        let slope = |(k, of): (usize, &DriftOf)| {
-            let (value_kms, sigma_kms) = (values[constant + k * terms], sigmas[constant + k * terms]);
-            let [kms_d, sigma_kms_d] = [value_kms, sigma_kms].map(|kms| kms / of.half_span_d);
-            FoundDrift { kms_d, sigma_kms_d, data_set: of.set.map(|set| set + 1) }
-        };
-        let drifts = imager.drifts();
-        let slopes = drifts.iter().enumerate().map(slope);
-        let drift = slopes.max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()));
+        let drifts = found_drifts(imager, all.len(), &values, &sigmas).into_iter();
+        let drift = drifts.max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()));
         Some(Constants {
             systemic: if is_free { found.next() } else { None },
             offsets: found.collect(),

@@ -6,6 +6,7 @@
 //! steps are exact.
 
 mod data;
+mod drift;
 mod problem;
 mod profile;
 
@@ -21,6 +22,7 @@ use crate::surface::photometry::LightCurve;
 use nalgebra::DVector;
 
 pub use data::Data;
+pub use drift::Drift;
 pub use problem::ImagingProblem;
 
 /// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
@@ -65,54 +67,8 @@ pub struct Imager {
     /// Standard deviation of what is wrong alike in all profiles of a data set (continuum 1), of which only integrated
     /// maps know; 0 for none.
     pub mean_profile: f64,
-    /// A drift of the velocities, of which only integrated maps know.
-    pub drift: Option<Drift>,
-}
-
-/// A drift of the velocities: a polynomial in time with Gaussian priors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drift {
-    /// Whether there is a curvature beside the slope.
-    pub curved: bool,
-}
-
-/// The drift of profiles whose offsets are known: time counts from the middle of these profiles.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DriftOf {
-    /// The data set, where its offset is fitted: a drift of the star from set to set would not be told from it.
-    pub set: Option<usize>,
-    /// The profiles.
-    profiles: Vec<usize>,
-    /// Middle of their times (d).
-    mid_d: f64,
-    /// Half of their span (d).
-    pub half_span_d: f64,
-}
-
-/// Standard deviation of the prior of a drift: of the velocity (km/s) at the end of the data over that in the middle,
-/// and of its slope (km/s/d) where that is less. No spectrograph and no companion on a long orbit drifts faster, and a
-/// planet is not to be taken for a drift within one or two nights.
-const DRIFT: (f64, f64) = (0.5, 0.1);
-
-impl Drift {
-    /// Number of its terms.
-    pub fn terms(&self) -> usize {
-        if self.curved { 2 } else { 1 }
-    }
-}
-
-impl DriftOf {
-    /// Standard deviation of each term (km/s).
-    fn sd_kms(&self) -> f64 {
-        let (kms, kms_d) = DRIFT;
-        kms.min(kms_d * self.half_span_d)
-    }
-
-    /// Velocities at a time (d) by one km/s of each term.
-    fn at(&self, time_d: f64) -> [f64; 2] {
-        let x = (time_d - self.mid_d) / self.half_span_d;
-        [x, x * x - 1.0 / 3.0]
-    }
+    /// Drifts of the velocities that are integrated out, of which only integrated maps know; mostly none.
+    pub drifts: Vec<Drift>,
 }
 
 impl Imager {
@@ -129,7 +85,7 @@ impl Imager {
             zero_points: Vec::new(),
             light_curves: Vec::new(),
             mean_profile: 0.0,
-            drift: None,
+            drifts: Vec::new(),
         }
     }
 
@@ -207,6 +163,18 @@ impl Imager {
         self.sets[set].sampling.profiles.iter_mut().for_each(|profile| profile.1 -= kms);
     }
 
+    /// Moves the velocities at which one profile is expected, by `kms` to the red.
+    fn move_profile(&mut self, mut k: usize, kms: f64) {
+        for set in &mut self.sets {
+            let profiles = &mut set.sampling.profiles;
+            if let Some(profile) = profiles.get_mut(k) {
+                profile.1 -= kms;
+                return;
+            }
+            k -= profiles.len();
+        }
+    }
+
     /// Holds a zero point that is integrated out farther to the red, by `kms`.
     pub fn move_zero_point(&mut self, z: usize, kms: f64) {
         self.move_set(self.zero_points[z].set, kms);
@@ -222,40 +190,61 @@ impl Imager {
             Common { of_each, mean_kms: prior.mean_kms, sd_kms: prior.sd_kms }
         };
         let mut all: Vec<Common> = self.zero_points.iter().map(offset).collect();
-        let (drifts, times_d) = (self.drifts(), self.times_d());
-        for (of, term) in drifts.iter().flat_map(|of| (0..self.drift.map_or(0, |d| d.terms())).map(move |t| (of, t))) {
-            let mut of_each = DVector::zeros(coordinates);
-            of.profiles.iter().for_each(|k| of_each[*k] = of.at(times_d[*k])[term]);
-            all.push(Common { of_each, mean_kms: 0.0, sd_kms: of.sd_kms() });
+        let times_d = self.times_d();
+        for (drift, profiles) in self.drifts.iter().map(|drift| (drift, self.drifting(drift))) {
+            let terms = (0..drift.terms()).map(|term| {
+                let mut of_each = DVector::zeros(coordinates);
+                profiles.iter().for_each(|k| of_each[*k] = drift.at(times_d[*k])[term]);
+                Common { of_each, mean_kms: drift.mean_kms(term), sd_kms: drift.sd_kms() }
+            });
+            all.extend(terms);
         }
         all
     }
 
-    /// The drifts that are integrated out: that of all profiles whose offsets are known, and one of each data set whose
-    /// offset is fitted.
-    pub fn drifts(&self) -> Vec<DriftOf> {
-        if self.drift.is_none() {
-            return Vec::new();
-        }
+    /// The same with drifts of the velocities: that of all profiles whose offsets are known, and one of each data set
+    /// whose offset is fitted, from which a drift of the star from set to set would not be told.
+    pub fn with_drifts(mut self, curved: bool) -> Self {
         let is_fitted = |set: &usize| self.zero_points.iter().any(|prior| prior.set == *set);
-        let (own, together): (Vec<usize>, Vec<usize>) = (0..self.sets.len()).partition(is_fitted);
+        let fitted = (0..self.sets.len()).filter(is_fitted).map(Some);
         let times_d = self.times_d();
-        let of = |set: Option<usize>, profiles: Vec<usize>| {
-            let times = profiles.iter().map(|k| times_d[*k]);
-            let ends = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
-            let (mid_d, half_span_d) = (0.5 * (ends.0 + ends.1), 0.5 * (ends.1 - ends.0));
-            (half_span_d > 0.0 && half_span_d.is_finite()).then_some(DriftOf { set, profiles, mid_d, half_span_d })
+        let of = |set: Option<usize>| {
+            let profiles = self.profiles_with_offset(set);
+            Drift::over(profiles.iter().map(|k| times_d[*k]), curved).map(|drift| Drift { set, ..drift })
         };
-        let of_all = of(None, together.into_iter().flat_map(|set| self.profiles_of(set)).collect());
-        of_all
-            .into_iter()
-            .chain(own.into_iter().filter_map(|set| of(Some(set), self.profiles_of(set).collect())))
-            .collect()
+        self.drifts = std::iter::once(None).chain(fitted).filter_map(of).collect();
+        self
+    }
+
+    /// Holds each drift steeper by `kms_d`: profiles are expected where it moves them.
+    pub fn hold_drifts(&mut self, kms_d: &[f64]) {
+        let times_d = self.times_d();
+        for (d, kms_d) in kms_d.iter().enumerate() {
+            let steeper = Drift { held_kms_d: *kms_d, ..self.drifts[d] };
+            for k in self.drifting(&steeper) {
+                self.move_profile(k, steeper.held_kms(times_d[k]));
+            }
+            self.drifts[d].held_kms_d += kms_d;
+        }
+    }
+
+    /// The profiles that drift with it.
+    fn drifting(&self, drift: &Drift) -> Vec<usize> {
+        self.profiles_with_offset(drift.set)
+    }
+
+    /// The profiles of the data set with this fitted offset; without one, all profiles whose offsets are known.
+    fn profiles_with_offset(&self, set: Option<usize>) -> Vec<usize> {
+        let is_known = |set: &usize| self.zero_points.iter().all(|prior| prior.set != *set);
+        match set {
+            Some(set) => self.profiles_of(set).collect(),
+            None => (0..self.sets.len()).filter(is_known).flat_map(|set| self.profiles_of(set)).collect(),
+        }
     }
 
     /// Whether there are such velocities.
     pub fn has_common_velocities(&self) -> bool {
-        !self.zero_points.is_empty() || self.drift.is_some()
+        !self.zero_points.is_empty() || !self.drifts.is_empty()
     }
 
     /// Number of each profile's data set, from 1; empty where there is only one.
@@ -304,10 +293,14 @@ impl Imager {
         let mut zero_points = self.zero_points.clone();
         let is_left = |set: &Seen| !set.sampling.profiles.is_empty();
         zero_points.retain(|prior| is_left(&sets[prior.set]));
-        zero_points.iter_mut().for_each(|prior| prior.set = sets[..prior.set].iter().filter(|s| is_left(s)).count());
+        let place = |set: usize| sets[..set].iter().filter(|set| is_left(set)).count();
+        zero_points.iter_mut().for_each(|prior| prior.set = place(prior.set));
+        let mut drifts = self.drifts.clone();
+        drifts.retain(|drift| drift.set.is_none_or(|set| is_left(&sets[set])));
+        drifts.iter_mut().for_each(|drift| drift.set = drift.set.map(place));
         sets.retain(is_left);
         let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
-        Imager { sets, zero_points, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+        Imager { sets, zero_points, drifts, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
     }
 
     /// The same with errors of each profile times its factor.

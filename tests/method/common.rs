@@ -76,7 +76,7 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
         zero_points: Vec::new(),
         light_curves: Vec::new(),
         mean_profile: 0.0,
-        drift: None,
+        drifts: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

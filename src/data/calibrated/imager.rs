@@ -12,7 +12,7 @@ use crate::surface::calibration::offsets;
 use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::star::too_wide_kms;
 use crate::surface::expansion::nuisances;
-use crate::surface::imaging::{Drift, Imager, ZeroPointPrior};
+use crate::surface::imaging::{Imager, ZeroPointPrior};
 
 /// What the observations `parts` of these data `sets` are imaged with, with a map of each of the `seasons`. An offset
 /// that is to be found is at 0.
@@ -49,10 +49,6 @@ pub fn imager(
         let priors = sets.iter().map(|set| set.nuisances.unwrap_or_default());
         imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
     }
-    imager.drift = match settings.drift {
-        None | Some(VelocityDrift::None) => None,
-        Some(drift) => Some(Drift { curved: drift == VelocityDrift::Quadratic }),
-    };
     for (set, DataSetSettings { zero_point, .. }) in sets.iter().enumerate() {
         match *zero_point {
             ZeroPoint::Number(0.0) => {}
@@ -62,7 +58,10 @@ pub fn imager(
             }
         }
     }
-    Ok(imager)
+    Ok(match settings.drift {
+        None | Some(VelocityDrift::None) => imager,
+        Some(drift) => imager.with_drifts(drift == VelocityDrift::Quadratic),
+    })
 }
 
 /// Finds the velocity offsets of data sets that are fitted, and holds them in `imager`.

@@ -56,9 +56,9 @@ pub struct Measured {
     /// `observations.events`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub events: Option<Events>,
-    /// `star.velocity_drift`: whether the profiles show a slope of the velocities.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub drift: bool,
+    /// `star.velocity_drift`: slopes of the velocities that the profiles show (km/s per day), with which they are imaged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drift_kms_d: Vec<f64>,
     /// The field of spots that was fitted on the way to star and events, from which a fit with finer maps begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_start: Option<FieldStart>,

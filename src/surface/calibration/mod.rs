@@ -11,7 +11,7 @@ pub mod star;
 pub mod target;
 
 use crate::model::{Parameter, ParameterValues};
-use crate::surface::evolving_map::star::{coarsely, have_slope};
+use crate::surface::evolving_map::star::{coarsely, slopes};
 use crate::surface::evolving_map::{Assumed, NoFit};
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
@@ -26,7 +26,7 @@ pub struct Asked<'a> {
     pub fitted: &'a [Parameter],
     /// Events, with what is known of each profile.
     pub events: Option<&'a [ByHand]>,
-    /// Whether the velocities have a slope.
+    /// Whether the velocities have a slope; one that the imager integrates out anyway is held where it is found.
     pub slope: bool,
     /// Parameters that are integrated out.
     pub nuisances: &'a [Nuisance],
@@ -39,14 +39,15 @@ pub struct FoundStar {
     pub star: Option<MeasuredStar>,
     /// Events, where they are looked for.
     pub events: Option<Events>,
-    /// Whether the velocities have a slope.
-    pub has_slope: bool,
+    /// Slopes at which drifts of the velocities are held (km/s per day); empty where they have none.
+    pub drift_kms_d: Vec<f64>,
     /// Where a fit with finer maps begins.
     pub field: FieldStart,
 }
 
 /// What the profiles say of all that is `asked`. Flares would be taken for regions, and regions for flares: events are
-/// found with plain spots first, and anew with the star that is found without them. `report` is told what is under way.
+/// found with plain spots first, and anew with the star that is found without them. Spots and jitter would take up a
+/// drift: profiles are expected where it moves them before either is fitted. `report` is told what is under way.
 ///
 /// # Errors
 /// [`NoFit`].
@@ -63,11 +64,23 @@ pub fn found(
     };
     report("fitting active regions");
     let mut plain = coarsely(imager, values, *known)?;
-    let has_slope = asked.slope && have_slope(imager, &plain, asked.nuisances)?;
+    let mut drifting = match asked.slope {
+        true => imager.clone().with_drifts(false),
+        false => imager.clone(),
+    };
+    let drift_kms_d = slopes(&drifting, &plain, asked.nuisances)?.unwrap_or_default();
+    let imager = match drift_kms_d.is_empty() {
+        true => imager,
+        false => {
+            drifting.hold_drifts(&drift_kms_d);
+            plain = coarsely(&drifting, values, *known)?;
+            &drifting
+        }
+    };
     let first = events(imager, plain.marginal.assumed)?;
     if asked.fitted.is_empty() {
         let field = plain.marginal.assumed.into();
-        return Ok(FoundStar { star: None, events: first, has_slope, field });
+        return Ok(FoundStar { star: None, events: first, drift_kms_d, field });
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -79,5 +92,5 @@ pub fn found(
     let mut imager = imager.clone();
     star.put_into(&mut imager);
     let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-    Ok(FoundStar { star: Some(star), events, has_slope, field: near.into() })
+    Ok(FoundStar { star: Some(star), events, drift_kms_d, field: near.into() })
 }

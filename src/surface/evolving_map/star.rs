@@ -121,14 +121,18 @@ pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> R
     fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
 }
 
-/// Whether the velocities of the star, by its field `near`, have a slope, beside no orbit.
+/// The slopes of drifts of the velocities (km/s per day) by the field `near`, beside no orbit, where one is steep.
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn have_slope(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<bool, FieldError> {
+pub fn slopes(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<Option<Vec<f64>>, FieldError> {
+    if imager.drifts.is_empty() {
+        return Ok(None);
+    }
     let (marginal, basis) = (&near.marginal, Basis::coarse(&imager.grid, DEGREE));
     let held = marginal.known_zero_points(imager, &basis, &[])?.velocities(&[]);
-    Ok(constants::have_slope(&held, imager, nuisances, marginal.values[Parameter::Vsys]))
+    let slopes = constants::slopes(&held, imager, nuisances, marginal.values[Parameter::Vsys]);
+    Ok(slopes.and_then(|(kms_d, is_steep)| is_steep.then_some(kms_d)))
 }
 
 /// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
