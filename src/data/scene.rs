@@ -6,7 +6,7 @@ mod truth;
 use crate::data::calibrated::{Calibrated, of_sets};
 use crate::data::config::{Config, ConfigError, DataSetSettings, Settings};
 use crate::data::dataset::{Dataset, in_memory, is_within};
-use crate::data::io::provenance::{Measured, Provenance};
+use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::inference::evidence::EvidenceRecord;
 use crate::inference::search::{self, Found, Progress, SearchError, SearchSettings};
 use crate::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues};
@@ -117,23 +117,44 @@ impl Scene {
     #[must_use]
     pub fn fitted(mut self, report: &dyn Fn(&str)) -> Self {
         let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
-        let is_open = !fitted.is_empty() || by_hand.is_some();
+        let contrasts = self.fitted_contrasts();
+        let is_open = !fitted.is_empty() || by_hand.is_some() || !contrasts.is_empty();
         if !is_open || self.measured.star.is_some() || self.measured.events.is_some() {
             return self;
         }
         let (known, values) = (self.settings.known_field(), self.settings.values);
         let (nuisances, slope) = (nuisances(&self.settings.free), self.settings.drift.is_none());
-        let asked = Asked { fitted: &fitted, events: by_hand.as_deref(), slope, nuisances: &nuisances };
+        let events = by_hand.as_deref();
+        let asked = Asked { fitted: &fitted, events, slope, contrasts: &contrasts, nuisances: &nuisances };
         match calibration::found(&self.imager, values, &known, asked, report) {
-            Ok(FoundStar { star, events, drift_kms_d, field }) => {
+            Ok(FoundStar { star, events, drift_kms_d, contrasts: of_sets, field }) => {
                 let field_start = Some(field);
-                self.with_found(&Measured { star, events, drift_kms_d, field_start, ..Measured::default() })
+                let mut sets = self.measured.sets.clone();
+                contrasts.iter().zip(of_sets).for_each(|(set, contrast)| sets[*set].contrast = Some(contrast));
+                self.with_found(&Measured { star, events, drift_kms_d, field_start, sets, ..Measured::default() })
             }
             Err(error) => {
                 self.measured.profiles.push(format!("star and outliers not fitted: {error}"));
                 self
             }
         }
+    }
+
+    /// Data sets whose contrast of spots is fitted.
+    fn fitted_contrasts(&self) -> Vec<usize> {
+        let fits = |(set, settings): (usize, &DataSetSettings)| settings.fits_contrast.then_some(set);
+        self.settings.sets.iter().enumerate().filter_map(fits).collect()
+    }
+
+    /// The same with contrasts of spots of these data sets as they were fitted.
+    fn with_contrasts(mut self, sets: &[MeasuredSet]) -> Self {
+        for (set, found) in sets.iter().enumerate() {
+            if let Some(contrast) = found.contrast {
+                self.imager.sets[set].contrast = Some(contrast.value);
+                self.measured.sets[set].contrast = Some(contrast);
+            }
+        }
+        self
     }
 
     /// What is known of events among the profiles; `None` where they are not looked for.
@@ -160,6 +181,7 @@ impl Scene {
             None => self,
         };
         scene.measured.field_start = scene.measured.field_start.or(found.field_start);
+        scene = scene.with_contrasts(&found.sets);
         if scene.measured.drift_kms_d.is_empty() {
             scene = scene.with_drift(&found.drift_kms_d);
         }
@@ -223,9 +245,9 @@ impl Scene {
         let (measured, imager) = (measured.clone(), imager.clone());
         let sha256 = self.data_sha256.clone();
         let before = Calibrated { observations, sha256, measured, chi2_target: *chi2_target, imager };
-        let Measured { star, drift_kms_d, .. } = self.measured.clone();
+        let Measured { star, drift_kms_d, sets, .. } = self.measured.clone();
         let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?);
-        let scene = scene.with_drift(&drift_kms_d);
+        let scene = scene.with_drift(&drift_kms_d).with_contrasts(&sets);
         Ok(match star {
             Some(star) => scene.with_star(star),
             None => scene,

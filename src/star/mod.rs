@@ -98,6 +98,28 @@ impl LocalLine {
         LocalLine { sigma_kms, instrumental_sigma_kms: 0.0, gamma_kms: 0.0, equivalent_width_kms }
     }
 
+    /// Standard deviation (km/s) of the star's own Gaussian.
+    pub fn own_sigma_kms(&self) -> f64 {
+        (self.sigma_kms.powi(2) - self.instrumental_sigma_kms.powi(2)).max(0.0).sqrt()
+    }
+
+    /// The line where another one, as it is seen elsewhere, has changed.
+    #[must_use]
+    pub fn in_proportion(self, before: &LocalLine, after: &LocalLine) -> Self {
+        let mut line = self;
+        if before.sigma_kms != after.sigma_kms && before.own_sigma_kms() > 0.0 {
+            let own = self.own_sigma_kms() * after.own_sigma_kms() / before.own_sigma_kms();
+            line.sigma_kms = own.hypot(self.instrumental_sigma_kms);
+        }
+        let widths = [self, *before, *after].map(|line| line.equivalent_width_kms);
+        if let [Some(own), Some(before), Some(after)] = widths
+            && before != after
+        {
+            line.equivalent_width_kms = Some(own * after / before);
+        }
+        line
+    }
+
     /// The equivalent width (km/s) of a line that profiles are made with.
     ///
     /// # Panics

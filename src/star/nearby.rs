@@ -32,7 +32,7 @@ impl Nearby {
     /// What responses close to a state of star and planet have in common.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
         let arranged = |set: &Seen| {
-            let star = set.star(star).with(&state.surface);
+            let star = set.star(star, &state.surface);
             Arranged::new(&observed(grid, &star, state, set, false), MARGIN)
         };
         Nearby { state: *state, pixels: sets.iter().map(arranged).collect() }
@@ -48,7 +48,7 @@ impl Nearby {
         sets: &[Seen],
     ) -> Option<Response> {
         let part = |(pixels, set): (&Arranged, &Seen)| {
-            let star = &set.star(star).with(&state.surface);
+            let star = &set.star(star, &state.surface);
             let deposits = || {
                 DEPOSITS.map(|limb_alone| {
                     let observed = observed(grid, star, state, set, limb_alone);

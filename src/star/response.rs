@@ -48,9 +48,8 @@ struct RegionPart {
 }
 
 impl Part {
-    /// The response at one state of star and planet.
+    /// The response at one state of star and planet; the star has the surface of that state, as the set sees it.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
-        let star = &star.with(&state.surface);
         let deposits = DEPOSITS.map(|limb_alone| {
             let observed = observed(grid, star, state, seen, limb_alone);
             needs(star, limb_alone).then(|| Arc::new(Deposit::new(&observed)))
@@ -62,7 +61,7 @@ impl Part {
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
         let limb = self.regions.as_ref().and_then(|regions| regions.limb.clone());
-        Part::shifted([Some(Arc::clone(&self.deposit)), limb], &star.with(&state.surface), state, seen)
+        Part::shifted([Some(Arc::clone(&self.deposit)), limb], star, state, seen)
     }
 
     /// Where the map that profile `k` sees stands among `all` pixels; a map that is alone is seen by all.
@@ -218,11 +217,11 @@ impl Part {
     }
 }
 
-/// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than
+/// Size of the velocity grid that a response takes: grid steps a bin, and nodes; the star has the surface of the state,
+/// as the set sees it. Refuse more than
 /// [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is asked for.
 pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
-    let star = star.with(&state.surface);
-    let steps = LineKernel::steps_per_bin(narrowest(&star), step_kms) as f64;
+    let steps = LineKernel::steps_per_bin(narrowest(star), step_kms) as f64;
     (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
 }
 

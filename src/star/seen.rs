@@ -1,8 +1,7 @@
 //! What data sets see of the star: when and at which velocities, and what looks different through each.
 
-use super::{LocalLine, StarSettings};
+use super::{LimbDarkening, LocalLine, Regions, StarSettings, Surface};
 use crate::star::observation::Observations;
-use std::borrow::Cow;
 
 /// When and at which velocities a data set observes the star.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +32,10 @@ pub struct Seen {
     pub line: Option<LocalLine>,
     /// Brightness of a wholly spotted pixel over that of the photosphere; that of the star's settings if `None`.
     pub contrast: Option<f64>,
+    /// Limb darkening; that of the star's settings if `None`.
+    pub limb_darkening: Option<LimbDarkening>,
+    /// What differs in active regions; as the star's settings have it if `None`.
+    pub regions: Option<Regions>,
     /// Times and velocity bins.
     pub sampling: Sampling,
     /// The map that each profile sees, where the star has several; empty where it has one.
@@ -50,17 +53,58 @@ pub struct OwnMap {
 
 impl From<Sampling> for Seen {
     fn from(sampling: Sampling) -> Self {
-        Seen { line: None, contrast: None, sampling, own_maps: Vec::new() }
+        Seen { line: None, contrast: None, limb_darkening: None, regions: None, sampling, own_maps: Vec::new() }
     }
 }
 
 impl Seen {
-    /// The star as this set sees it.
-    pub fn star<'a>(&self, star: &'a StarSettings) -> Cow<'a, StarSettings> {
-        if self.line.is_none() && self.contrast.is_none() {
-            return Cow::Borrowed(star);
+    /// The star with such a surface as this set sees it. Where its line is another one than the star's, it changes in
+    /// proportion to that.
+    pub fn star(&self, star: &StarSettings, surface: &Surface) -> StarSettings {
+        let mut seen = star.with(surface);
+        if let Some(own) = self.line {
+            seen.line = own.in_proportion(&star.line, &seen.line);
         }
-        let (line, contrast) = (self.line.unwrap_or(star.line), self.contrast.unwrap_or(star.contrast));
-        Cow::Owned(StarSettings { line, contrast, ..star.clone() })
+        seen.contrast = self.contrast.unwrap_or(seen.contrast);
+        seen.limb_darkening = self.limb_darkening.unwrap_or(seen.limb_darkening);
+        seen.regions = self.regions.unwrap_or(seen.regions);
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_has_its_own_limb_and_regions_and_a_line_in_proportion() {
+        let line = LocalLine { instrumental_sigma_kms: 3.0, ..LocalLine::gaussian(5.0, 6.0) };
+        let star = StarSettings {
+            rotation_period_d: 3.0,
+            epoch_d: 0.0,
+            limb_darkening: LimbDarkening::Linear(0.7),
+            contrast: 0.3,
+            line,
+            regions: Regions::PLAIN,
+        };
+        let regions = Regions { area: 2.0, line_width: 1.2, ..Regions::PLAIN };
+        let own = LocalLine { sigma_kms: 2.0, instrumental_sigma_kms: 0.0, equivalent_width_kms: Some(3.0), ..line };
+        let sampling = Sampling { step_kms: 2.0, profiles: Vec::new() };
+        let limb_darkening = Some(LimbDarkening::Linear(0.4));
+        let set = Seen { line: Some(own), limb_darkening, regions: Some(regions), ..sampling.clone().into() };
+        // the fit finds the line half as wide as it was, and a third stronger
+        let surface = Surface {
+            line_sigma_kms: Some(2.0),
+            equivalent_width_kms: Some(8.0),
+            limb_darkening: Some(0.9),
+            region_area: Some(5.0),
+            ..Surface::default()
+        };
+        let seen = set.star(&star, &surface);
+        assert_eq!((seen.limb_darkening, seen.regions, seen.contrast), (LimbDarkening::Linear(0.4), regions, 0.3));
+        assert!((seen.line.sigma_kms - 1.0).abs() < 1e-12, "{:?}", seen.line);
+        assert_eq!(seen.line.equivalent_width_kms, Some(4.0));
+        assert_eq!(set.star(&star, &Surface::default()).line, own);
+        assert_eq!(Seen::from(sampling).star(&star, &surface), star.with(&surface));
     }
 }

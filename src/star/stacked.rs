@@ -27,7 +27,7 @@ impl Response {
 
     /// The response of data `sets`.
     pub fn of_sets(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
-        let part = |set: &Seen| Part::new(grid, &set.star(star), state, set);
+        let part = |set: &Seen| Part::new(grid, &set.star(star, &state.surface), state, set);
         Response::stacked(sets.iter().map(part).collect())
     }
 
@@ -45,7 +45,7 @@ impl Response {
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the lines are
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
-        let shifted = |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star), state, set);
+        let shifted = |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star, &state.surface), state, set);
         Response::stacked(self.parts.iter().zip(sets).map(shifted).collect())
     }
 

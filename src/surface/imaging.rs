@@ -216,15 +216,15 @@ impl Imager {
         self
     }
 
-    /// Holds each drift steeper by `kms_d`: profiles are expected where it moves them.
+    /// Holds each drift at a slope (km/s/d): profiles are expected where it moves them.
     pub fn hold_drifts(&mut self, kms_d: &[f64]) {
         let times_d = self.times_d();
         for (d, kms_d) in kms_d.iter().enumerate() {
-            let steeper = Drift { held_kms_d: *kms_d, ..self.drifts[d] };
-            for k in self.drifting(&steeper) {
-                self.move_profile(k, steeper.held_kms(times_d[k]));
+            let (before, held) = (self.drifts[d], Drift { held_kms_d: *kms_d, ..self.drifts[d] });
+            for k in self.drifting(&held) {
+                self.move_profile(k, held.held_kms(times_d[k]) - before.held_kms(times_d[k]));
             }
-            self.drifts[d].held_kms_d += kms_d;
+            self.drifts[d] = held;
         }
     }
 

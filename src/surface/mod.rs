@@ -38,6 +38,7 @@ pub mod planned {
 }
 
 pub use constants::{ConstantVelocity, Constants, FoundDrift};
+pub use evolving_map::contrast::FittedContrast;
 pub use evolving_map::{Change, FieldStart, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};

@@ -349,3 +349,40 @@ fn what_makes_no_sense_is_refused_by_its_key() {
     desk.write("star.json", &config.to_string());
     says(&desk.refusal(&["map", "star.json", "--out", "map"]), &["observations[1]", "either all"]);
 }
+
+/// Spots that are fainter in the infrared: their contrast there is found, and nothing else is.
+#[test]
+fn the_contrast_of_a_second_set_is_fitted() {
+    let mut simulated = two_sets();
+    let cycles = |first: f64| (0..14).map(|k| first + 0.117 * f64::from(k)).collect::<Vec<f64>>();
+    simulated["planet"]["k_kms"] = json!(0.0);
+    simulated["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
+    for (set, first) in [(0, 0.0), (1, 0.05)] {
+        simulated["observations"][set]["simulate"]["snr"] = json!(1000);
+        simulated["observations"][set]["simulate"]["cycles"] = json!(cycles(first));
+    }
+    let red = &mut simulated["observations"][1];
+    (red["contrast"], red["limb_darkening"]) = (json!(0.8), json!({ "law": "linear", "coefficients": [0.3] }));
+    let desk = Desk::new(simulated.clone());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = from_files(&simulated);
+    config["observations"][1]["contrast"] = json!("fitted");
+    desk.write("star.json", &config.to_string());
+    let said = desk.succeed(&["map", "star.json", "--out", "map"]);
+    says(&said, &["red: 14 profiles", "spot contrast 0."]);
+    let map = desk.json("map/map.json");
+    let contrast = &map["data_sets"][1]["contrast"];
+    let [value, sigma] = ["value", "sigma"].map(|key| contrast[key].as_f64().unwrap_or_else(|| panic!("{contrast}")));
+    assert!((value - 0.8).abs() < 3.0 * sigma && sigma < 0.05, "{contrast}");
+    assert_eq!(map["data_sets"][0].get("contrast"), None);
+    let refused = |set: usize, key: &str, value: Value, expected: &str| {
+        let mut config = config.clone();
+        config["observations"][set][key] = value;
+        desk.write("wrong.json", &config.to_string());
+        says(&desk.refusal(&["map", "wrong.json", "--out", "wrong"]), &[expected]);
+    };
+    refused(0, "contrast", json!("fitted"), "observations[0].contrast: a number: contrasts of other data sets");
+    refused(1, "regions", json!({ "area": 30 }), "observations[1].regions.area: 30 must be from 0 to 20");
+    let wrong = json!({ "law": "linear", "coefficients": [1.3] });
+    refused(1, "limb_darkening", wrong, "observations[1].limb_darkening.coefficients: 1.3 must be from 0 to 1");
+}

@@ -31,13 +31,15 @@ pub fn imager(
         stars.push(star_for(settings, set, part)?);
     }
     let star = stars[0].clone();
-    let seen = |(own, part): (&StarSettings, &Observations)| Seen {
+    let seen = |((own, set), part): ((&StarSettings, &DataSetSettings), &Observations)| Seen {
         line: Some(own.line).filter(|line| *line != star.line),
-        contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
+        contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast || set.fits_contrast),
+        limb_darkening: set.limb_darkening,
+        regions: set.regions,
         sampling: Sampling::of(part),
         own_maps: Vec::new(),
     };
-    let seen: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
+    let seen: Vec<Seen> = stars.iter().zip(sets).zip(parts).map(seen).collect();
     let all = Observations::joined(parts.to_vec());
     let imager = Imager::of_sets(star, seen, &all, settings.imaging.pixels, settings.imaging.entropy());
     if let Some(fwhm_kms) = too_wide_kms(&imager, &imager.star) {

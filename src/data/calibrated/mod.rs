@@ -90,6 +90,7 @@ impl Calibrated {
                     profiles: part.profiles.len(),
                     errors,
                     zero_point: if set.zero_point.is_word() { held.next() } else { None },
+                    contrast: None,
                 };
                 measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
             }

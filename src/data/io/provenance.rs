@@ -7,7 +7,7 @@ use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::target::ChosenTarget;
-use crate::surface::{ConstantVelocity, FieldStart};
+use crate::surface::{ConstantVelocity, FieldStart, FittedContrast};
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.
@@ -97,6 +97,9 @@ pub struct MeasuredSet {
     /// Its `zero_point_kms`, where it is fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_point: Option<HeldZeroPoint>,
+    /// Its `contrast`, where it is fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<FittedContrast>,
 }
 
 impl MeasuredSet {
@@ -108,9 +111,23 @@ impl MeasuredSet {
             }
             None => ", RV offset marginalised".to_owned(),
         });
+        let contrast = self.contrast.as_ref();
+        let contrast = contrast.map(|of| format!(", spot contrast {:.3} ± {:.3}", of.value, of.sigma));
         let errors = self.errors.as_ref().map(|errors| format!(", uncertainties {}", errors.line()));
-        let (name, profiles) = (&self.name, self.profiles);
-        format!("{name}: {profiles} profiles{}{}", zero_point.unwrap_or_default(), errors.unwrap_or_default())
+        let own: String = [zero_point, contrast, errors].into_iter().flatten().collect();
+        format!("{}: {} profiles{own}", self.name, self.profiles)
+    }
+}
+
+impl MeasuredSet {
+    /// Why the contrast of its spots cannot be what was fitted, with a name for it.
+    fn problem(&self) -> Option<String> {
+        self.contrast.filter(FittedContrast::is_at_bound)?;
+        Some(format!(
+            "spots of data set {} would have to be darker than black (contrast-at-bound): lower the contrast of the first \
+             data set, or list the data set with the darker spots first",
+            self.name
+        ))
     }
 }
 
@@ -130,7 +147,8 @@ impl Measured {
     /// Why nothing can be judged with what was found of star and events, with a name for it.
     pub fn problem(&self) -> Option<String> {
         let of_events = self.events.as_ref().and_then(Events::too_many);
-        of_events.or_else(|| self.star.as_ref().and_then(MeasuredStar::problem))
+        let of_contrasts = || self.sets.iter().find_map(MeasuredSet::problem);
+        of_events.or_else(|| self.star.as_ref().and_then(MeasuredStar::problem)).or_else(of_contrasts)
     }
 
     /// That the model does not fit as well as the continuum promises, where the errors say so.

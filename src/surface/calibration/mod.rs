@@ -11,8 +11,9 @@ pub mod star;
 pub mod target;
 
 use crate::model::{Parameter, ParameterValues};
+use crate::surface::evolving_map::contrast::{FittedContrast, fit_contrast};
 use crate::surface::evolving_map::star::{coarsely, slopes};
-use crate::surface::evolving_map::{Assumed, NoFit};
+use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
 use crate::surface::{FieldStart, Known};
@@ -28,6 +29,8 @@ pub struct Asked<'a> {
     pub events: Option<&'a [ByHand]>,
     /// Whether the velocities have a slope; one that the imager integrates out anyway is held where it is found.
     pub slope: bool,
+    /// Data sets with a contrast of spots for each.
+    pub contrasts: &'a [usize],
     /// Parameters that are integrated out.
     pub nuisances: &'a [Nuisance],
 }
@@ -41,6 +44,8 @@ pub struct FoundStar {
     pub events: Option<Events>,
     /// Slopes at which drifts of the velocities are held (km/s per day); empty where they have none.
     pub drift_kms_d: Vec<f64>,
+    /// Contrasts of spots of the data sets that have one each.
+    pub contrasts: Vec<FittedContrast>,
     /// Where a fit with finer maps begins.
     pub field: FieldStart,
 }
@@ -68,19 +73,28 @@ pub fn found(
         true => imager.clone().with_drifts(false),
         false => imager.clone(),
     };
-    let drift_kms_d = slopes(&drifting, &plain, asked.nuisances)?.unwrap_or_default();
-    let imager = match drift_kms_d.is_empty() {
-        true => imager,
-        false => {
-            drifting.hold_drifts(&drift_kms_d);
-            plain = coarsely(&drifting, values, *known)?;
-            &drifting
-        }
+    let mut drift_kms_d = Vec::new();
+    // a steep one has bent the maps from which it was found
+    for _ in 0..2 {
+        let Some(kms_d) = slopes(&drifting, &plain, asked.nuisances)? else { break };
+        drifting.hold_drifts(&kms_d);
+        plain = coarsely(&drifting, values, *known)?;
+        drift_kms_d = kms_d;
+    }
+    let imager = if drift_kms_d.is_empty() { imager } else { &drifting };
+    let contrasts = |imager: &mut Imager, near: &Fitted| {
+        asked.contrasts.iter().map(|set| fitted_contrast(imager, near, *set)).collect::<Result<Vec<_>, NoFit>>()
     };
+    let mut imager = imager.clone();
+    let mut of_sets = contrasts(&mut imager, &plain)?;
+    if !of_sets.is_empty() {
+        plain = coarsely(&imager, values, *known)?;
+    }
+    let imager = &imager;
     let first = events(imager, plain.marginal.assumed)?;
     if asked.fitted.is_empty() {
         let field = plain.marginal.assumed.into();
-        return Ok(FoundStar { star: None, events: first, drift_kms_d, field });
+        return Ok(FoundStar { star: None, events: first, drift_kms_d, contrasts: of_sets, field });
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -88,9 +102,24 @@ pub fn found(
         plain = coarsely(&without, values, *known)?;
     }
     report("fitting active regions");
-    let (star, near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
+    let (star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
     let mut imager = imager.clone();
     star.put_into(&mut imager);
+    if !of_sets.is_empty() && !star.numbers.is_empty() {
+        // the line of regions has taken up some of what spots were dark for
+        star.put_into(&mut without);
+        let Fitted { marginal, .. } = coarsely(&without, values, Known { start: Some(near.into()), ..*known })?;
+        near = marginal.assumed;
+        of_sets = contrasts(&mut without, &Fitted::near(marginal))?;
+        of_sets.iter().zip(asked.contrasts).for_each(|(of, set)| imager.sets[*set].contrast = Some(of.value));
+    }
     let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-    Ok(FoundStar { star: Some(star), events, drift_kms_d, field: near.into() })
+    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts: of_sets, field: near.into() })
+}
+
+/// The contrast of spots in a data `set`, which is put into the imager.
+fn fitted_contrast(imager: &mut Imager, near: &Fitted, set: usize) -> Result<FittedContrast, NoFit> {
+    let fitted = fit_contrast(imager, near, set)?;
+    imager.sets[set].contrast = Some(fitted.value);
+    Ok(fitted)
 }

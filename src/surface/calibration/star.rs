@@ -7,7 +7,7 @@
 
 use crate::model::{Parameter, ParameterValues};
 use crate::numerics::units::FWHM_PER_SIGMA;
-use crate::star::{LocalLine, Seen, StarSettings};
+use crate::star::{Seen, StarSettings};
 use crate::surface::Known;
 use crate::surface::evolving_map::star::{FittedStar, StarPrior, fit_star};
 use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
@@ -112,10 +112,7 @@ impl MeasuredStar {
         let values = plain.marginal.values;
         let star = imager.star.with(&values.surface);
         let value = |parameter: Parameter| match parameter {
-            Parameter::LineSigma => {
-                let LocalLine { sigma_kms, instrumental_sigma_kms, .. } = star.line;
-                (sigma_kms.powi(2) - instrumental_sigma_kms.powi(2)).max(0.0).sqrt()
-            }
+            Parameter::LineSigma => star.line.own_sigma_kms(),
             Parameter::EquivalentWidth => star.line.strength_kms(),
             Parameter::LimbDarkening => star.limb_darkening.coefficients().0,
             _ => values.get(parameter).unwrap_or(0.0),
@@ -144,7 +141,12 @@ impl MeasuredStar {
     pub fn put_into(&self, imager: &mut Imager) {
         let mut values = ParameterValues::of_eight([0.0; 8]);
         self.set(&mut values, |_| true);
-        imager.star = imager.star.with(&values.surface);
+        let star = imager.star.with(&values.surface);
+        imager
+            .sets
+            .iter_mut()
+            .for_each(|set| set.line = set.line.map(|own| own.in_proportion(&imager.star.line, &star.line)));
+        imager.star = star;
         imager.mean_profile = self.mean_profile;
     }
 

@@ -61,7 +61,7 @@ impl NoFit {
 
 impl Fitted {
     /// What a fit may start from.
-    pub(super) fn near(marginal: Marginal) -> Self {
+    pub(in crate::surface) fn near(marginal: Marginal) -> Self {
         Fitted { ln_evidence: marginal.ln_evidence(), marginal, at_bounds: Vec::new(), hessian: None }
     }
 

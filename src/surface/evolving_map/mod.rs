@@ -18,6 +18,7 @@ mod basis;
 pub mod change;
 mod climb;
 mod condense;
+pub mod contrast;
 mod density;
 mod design;
 pub mod events;

@@ -309,9 +309,9 @@ pub fn is_physical(imager: &Imager, values: &ParameterValues, theta: &[f64]) -> 
     }
     let state = values.state();
     let is_seen = |set: &Seen| {
-        let star = set.star(&imager.star);
+        let star = set.star(&imager.star, &state.surface);
         let (steps, nodes) = velocity_grid(&star, &state, set.sampling.step_kms);
-        nodes <= MOST_NODES && steps <= MOST_STEPS_PER_BIN && star.with(&state.surface).is_possible()
+        nodes <= MOST_NODES && steps <= MOST_STEPS_PER_BIN && star.is_possible()
     };
     imager.sets.iter().all(is_seen)
         && fastest.is_finite()

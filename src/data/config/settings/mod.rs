@@ -257,7 +257,7 @@ impl Settings {
         values: &ParameterValues,
         step_kms: f64,
     ) -> Result<(), ConfigError> {
-        let (steps, nodes) = velocity_grid(star, &values.state(), step_kms);
+        let (steps, nodes) = velocity_grid(&star.with(&values.state().surface), &values.state(), step_kms);
         if steps.is_nan() || steps > response::MOST_STEPS_PER_BIN {
             let sigma = star.line.sigma_kms;
             let problem = format!("{sigma} (with the instrument) is too narrow for velocity bins of {step_kms} km/s");

@@ -11,7 +11,7 @@ use crate::data::config::written::{
 };
 use crate::data::simulate::Simulation;
 use crate::model::{Parameter, ParameterValues};
-use crate::star::{BrightnessModel, StarSettings};
+use crate::star::{BrightnessModel, LimbDarkening, Regions, StarSettings};
 use crate::surface::calibration::noise::ErrorSettings;
 use crate::surface::nuisances::LineAndContinuum;
 use std::path::{Path, PathBuf};
@@ -29,6 +29,12 @@ pub struct DataSetSettings {
     /// The star as it sees it; where the equivalent width of its line is left to the profiles,
     /// [`star_for`](crate::data::calibrated::star_for) measures it.
     pub star: StarSettings,
+    /// Active regions as this set alone sees them.
+    pub regions: Option<Regions>,
+    /// Limb darkening of this set alone.
+    pub limb_darkening: Option<LimbDarkening>,
+    /// Whether the contrast of spots is fitted to its profiles.
+    pub fits_contrast: bool,
     /// Where the profiles come from.
     pub source: ObservationSource,
     /// Line and continuum of each profile.
@@ -104,7 +110,18 @@ pub(super) fn resolve_sets(
         if let ZeroPoint::Number(kms) = section.zero_point_kms {
             check_zero_point(&format!("{key}.zero_point_kms"), kms)?;
         }
+        let fits_contrast = section.contrast.is_some_and(|contrast| contrast.is_word());
+        if fits_contrast && (s == 0 || !has_field) {
+            let problem = match has_field {
+                true => "a number: contrasts of other data sets are fitted relative to that of the first",
+                false => "a number: fitted with imaging.objective \"marginal-likelihood\" only",
+            };
+            return Err(Fault::new(format!("{key}.contrast"), problem));
+        }
         sets.push(DataSetSettings {
+            regions: section.regions.map(|_| star.regions),
+            limb_darkening: section.limb_darkening.as_ref().map(|_| star.limb_darkening),
+            fits_contrast,
             name: section.name.clone().unwrap_or_else(|| format!("set{}", s + 1)),
             star,
             source,
@@ -243,7 +260,7 @@ fn star_of(
     values: &ParameterValues,
 ) -> Result<StarSettings, Fault> {
     let section = &written.observations.sections[s];
-    let ObservationsSection { line, wavelength_nm, contrast, resolving_power, .. } = section;
+    let ObservationsSection { line, wavelength_nm, contrast, resolving_power, limb_darkening, regions, .. } = section;
     let mut own = written.star.clone();
     let held = |parameter: Parameter, name: &str| match values.get(parameter) {
         Some(_) if parameter.is_surface() => {
@@ -265,13 +282,24 @@ fn star_of(
         }
         own.wavelength_nm = *wavelength_nm;
     }
-    if contrast.is_some() {
+    if let Some(contrast) = contrast {
         held(Parameter::Contrast, "contrast")?;
-        (own.contrast, own.photosphere_k, own.spot_k) = (*contrast, None, None);
+        if let Some(number) = contrast.number() {
+            (own.contrast, own.photosphere_k, own.spot_k) = (Some(number), None, None);
+        }
+    }
+    if let Some(limb_darkening) = limb_darkening {
+        held(Parameter::LimbDarkening, "limb_darkening")?;
+        own.limb_darkening = limb_darkening.clone();
+    }
+    if let Some(regions) = regions {
+        Parameter::REGIONS.into_iter().try_for_each(|parameter| held(parameter, "regions"))?;
+        own.regions = Some(*regions);
     }
     let resolution = resolving_power.or(written.instrument.resolving_power);
     let instrument = Instrument { resolving_power: resolution, ..Instrument::default() };
-    if line.is_none() && wavelength_nm.is_none() && contrast.is_none() && resolving_power.is_none() {
+    let is_as_the_star = line.is_none() && wavelength_nm.is_none() && contrast.is_none() && resolving_power.is_none();
+    if is_as_the_star && limb_darkening.is_none() && regions.is_none() {
         return Ok(star.clone());
     }
     resolve_star(&mut own, &instrument).map_err(|fault| {

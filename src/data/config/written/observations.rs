@@ -2,9 +2,9 @@
 //! JSON Schema.
 
 use super::listed::Section;
-use super::number_or::{Automatic, VelocityJitter, ZeroPoint};
+use super::number_or::{Automatic, OfStar, VelocityJitter, ZeroPoint};
 use super::per_parameter::PerParameter;
-use super::star::Line;
+use super::star::{LimbDarkeningSection, Line, RegionsSection};
 use crate::data::simulate::{RandomSpots, Schedule};
 use crate::surface::calibration::noise::Weights;
 use crate::surface::nuisances::LineAndContinuum;
@@ -62,9 +62,18 @@ pub struct ObservationsSection {
     /// `star.wavelength_nm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wavelength_nm: Option<f64>,
-    /// Brightness of a spot over that of the photosphere in this set, in place of what the star has.
+    /// Brightness of a spot over that of the photosphere in this set, in place of what the star has. "fitted", for the
+    /// second and further sets, with objective "marginal-likelihood": fitted to the profiles, starting from what the
+    /// star has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub contrast: Option<f64>,
+    pub contrast: Option<OfStar>,
+    /// Limb darkening in this set, in place of that of the star.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limb_darkening: Option<LimbDarkeningSection>,
+    /// Active regions as this set sees them, in place of `star.regions`. Numbers that are not given are those of a
+    /// dimmed photosphere; they are not fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub regions: Option<RegionsSection>,
     /// Line and continuum of each profile of this set, in place of `imaging.nuisances`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nuisances: Option<LineAndContinuum>,
