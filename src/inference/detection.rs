@@ -10,7 +10,7 @@ mod remarks;
 mod robustness;
 
 pub use remarks::Evidence;
-pub use robustness::{HeldOut, Robustness, WithoutNight, nights, robustness};
+pub use robustness::{HeldOut, Robustness, WithoutNight, robustness};
 
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::eccentric::keplerian;

@@ -158,3 +158,10 @@ impl Profile {
         depth.iter().enumerate().map(moment).sum::<f64>() / depth.iter().sum::<f64>()
     }
 }
+
+/// Profiles night by night, in order of time; nights are more than `gap_d` apart.
+pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..times_d.len()).collect();
+    order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
+    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= gap_d).map(<[usize]>::to_vec).collect()
+}

@@ -12,7 +12,7 @@ mod profile;
 
 use crate::maxent::entropy::Entropy;
 use crate::planets::periodogram::offset::Common;
-use crate::star::observation::Observations;
+use crate::star::observation::{Observations, nights};
 use crate::star::{
     Brightness, Nearby, OwnMap, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid,
 };
@@ -24,6 +24,9 @@ use nalgebra::DVector;
 pub use data::Data;
 pub use drift::Drift;
 pub use problem::ImagingProblem;
+
+/// Profiles that are at most so far apart (d) are of one night.
+const NIGHT_GAP_D: f64 = 0.3;
 
 /// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +70,11 @@ pub struct Imager {
     /// Standard deviation of what is wrong alike in all profiles of a data set (continuum 1), of which only integrated
     /// maps know; 0 for none.
     pub mean_profile: f64,
+    /// RV jitter of each data set over that of the star; empty where all have the same. Only integrated maps know.
+    pub jitter_shares: Vec<f64>,
+    /// Standard deviation of the RV offset that profiles of one night share (km/s), of each data set; empty where there
+    /// is none. Only integrated maps know.
+    pub night_jitters_kms: Vec<f64>,
     /// Drifts of the velocities that are integrated out, of which only integrated maps know; mostly none.
     pub drifts: Vec<Drift>,
 }
@@ -85,6 +93,8 @@ impl Imager {
             zero_points: Vec::new(),
             light_curves: Vec::new(),
             mean_profile: 0.0,
+            jitter_shares: Vec::new(),
+            night_jitters_kms: Vec::new(),
             drifts: Vec::new(),
         }
     }
@@ -202,6 +212,28 @@ impl Imager {
         all
     }
 
+    /// RV jitter of each profile over that of the star.
+    pub fn jitter_share_of_each(&self) -> Vec<f64> {
+        let share = |set: usize| self.jitter_shares.get(set).copied().unwrap_or(1.0);
+        self.sets.iter().enumerate().flat_map(|(s, set)| vec![share(s); set.sampling.profiles.len()]).collect()
+    }
+
+    /// The RV offsets of nights, of each data set whose profiles share some; for so many coordinates of an expansion,
+    /// of which the velocities of all profiles come first.
+    pub fn night_offsets(&self, coordinates: usize) -> Vec<Common> {
+        let times_d = self.times_d();
+        let of_set = |(set, &sd_kms): (usize, &f64)| {
+            let profiles = self.profiles_of(set);
+            let first = profiles.start;
+            nights(&times_d[profiles], NIGHT_GAP_D).into_iter().map(move |night| {
+                let mut of_each = DVector::zeros(coordinates);
+                night.iter().for_each(|k| of_each[first + k] = 1.0);
+                Common { of_each, mean_kms: 0.0, sd_kms }
+            })
+        };
+        self.night_jitters_kms.iter().enumerate().filter(|(_, sd_kms)| **sd_kms > 0.0).flat_map(of_set).collect()
+    }
+
     /// The same with drifts of the velocities: that of all profiles whose offsets are known, and one of each data set
     /// whose offset is fitted, from which a drift of the star from set to set would not be told.
     pub fn with_drifts(mut self, curved: bool) -> Self {
@@ -298,9 +330,23 @@ impl Imager {
         let mut drifts = self.drifts.clone();
         drifts.retain(|drift| drift.set.is_none_or(|set| is_left(&sets[set])));
         drifts.iter_mut().for_each(|drift| drift.set = drift.set.map(place));
+        let of_left = |numbers: &[f64]| {
+            let kept = numbers.iter().zip(&sets).filter(|(_, set)| is_left(set));
+            kept.map(|(number, _)| *number).collect::<Vec<f64>>()
+        };
+        let jitter_shares = of_left(&self.jitter_shares);
+        let night_jitters_kms = of_left(&self.night_jitters_kms);
         sets.retain(is_left);
         let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
-        Imager { sets, zero_points, drifts, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+        Imager {
+            sets,
+            zero_points,
+            jitter_shares,
+            night_jitters_kms,
+            drifts,
+            data: self.data.of_profiles(&kept.collect::<Vec<_>>()),
+            ..self.clone()
+        }
     }
 
     /// The same with errors of each profile times its factor.

@@ -386,3 +386,46 @@ fn the_contrast_of_a_second_set_is_fitted() {
     let wrong = json!({ "law": "linear", "coefficients": [1.3] });
     refused(1, "limb_darkening", wrong, "observations[1].limb_darkening.coefficients: 1.3 must be from 0 to 1");
 }
+
+/// A jitter for each set is one of its velocities alone; an offset of a night is that of its profiles together.
+#[test]
+fn sets_have_their_jitters_and_nights_their_offsets() {
+    let mut simulated = two_sets();
+    let pairs: Vec<f64> = (0..4).flat_map(|k| [0.0, 0.02].map(|late| 83.2 + 0.37 * f64::from(k) + late)).collect();
+    simulated["observations"][1]["simulate"]["cycles"] = json!(pairs);
+    let desk = Desk::new(simulated.clone());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = from_files(&simulated);
+    (config["observations"][0]["velocity_jitter_kms"], config["observations"][1]["velocity_jitter_kms"]) =
+        (json!(0.5), json!(0.0));
+    let rows = |file: &str, head: usize| -> Vec<Vec<f64>> {
+        let text = desk.read(file);
+        text.lines().skip(head).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
+    };
+    let search = |config: &Value, name: &str| {
+        desk.write("star.json", &config.to_string());
+        desk.succeed(&["periodogram", "star.json", "--out", name, "--draws", "1000"]);
+        let sigma = rows(&format!("{name}/rv.csv"), 1).iter().map(|row| row[3]).collect::<Vec<f64>>();
+        (sigma, rows(&format!("{name}/covariance.csv"), 0))
+    };
+    let (sigma, still) = search(&config, "still");
+    assert!(sigma[..7].iter().all(|sigma| *sigma > 0.5) && sigma[7..].iter().all(|sigma| *sigma < 0.4), "{sigma:?}");
+    config["observations"][1]["night_jitter_kms"] = json!(0.7);
+    let (_, moving) = search(&config, "moving");
+    let more = |j: usize, k: usize| moving[j][k] - still[j][k];
+    for (j, k) in [(7, 7), (7, 8), (13, 14)] {
+        assert!((more(j, k) - 0.49).abs() < 0.05, "{}", more(j, k));
+    }
+    for (j, k) in [(0, 0), (0, 1), (7, 9), (0, 7)] {
+        assert!(more(j, k).abs() < 0.05, "{}", more(j, k));
+    }
+    let refused = |set: usize, key: &str, value: Value, expected: &str| {
+        let mut config = config.clone();
+        config["observations"][set][key] = value;
+        desk.write("wrong.json", &config.to_string());
+        says(&desk.refusal(&["map", "wrong.json", "--out", "wrong"]), &[expected]);
+    };
+    let fitted = json!("fitted");
+    refused(1, "velocity_jitter_kms", fitted, "must be as in observations[0], or a number in every data set");
+    refused(1, "night_jitter_kms", json!(-1), "observations[1].night_jitter_kms: -1 must be from 0 to");
+}

@@ -77,6 +77,8 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
         light_curves: Vec::new(),
         mean_profile: 0.0,
         drifts: Vec::new(),
+        jitter_shares: Vec::new(),
+        night_jitters_kms: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

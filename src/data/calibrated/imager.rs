@@ -60,6 +60,12 @@ pub fn imager(
             }
         }
     }
+    if sets.iter().any(|set| set.jitter_share != 1.0) {
+        imager.jitter_shares = sets.iter().map(|set| set.jitter_share).collect();
+    }
+    if sets.iter().any(|set| set.night_jitter_kms > 0.0) {
+        imager.night_jitters_kms = sets.iter().map(|set| set.night_jitter_kms).collect();
+    }
     Ok(match settings.drift {
         None | Some(VelocityDrift::None) => imager,
         Some(drift) => imager.with_drifts(drift == VelocityDrift::Quadratic),

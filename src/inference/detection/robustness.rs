@@ -9,6 +9,7 @@ use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, orbits};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
+use crate::star::observation::nights;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, AtTarget};
 use nalgebra::DVector;
@@ -125,13 +126,6 @@ pub fn robustness(
 /// An orbit with the Delta ln L of another.
 fn with_height(orbit: Option<CircularOrbit>, other: Option<CircularOrbit>) -> Option<CircularOrbit> {
     Some(CircularOrbit { delta_ln_l: other?.delta_ln_l, ..orbit? })
-}
-
-/// Profiles night by night, in order of time; nights are more than `gap_d` apart.
-pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
-    let mut order: Vec<usize> = (0..times_d.len()).collect();
-    order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
-    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= gap_d).map(<[usize]>::to_vec).collect()
 }
 
 impl Robustness {

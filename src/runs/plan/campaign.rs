@@ -5,9 +5,9 @@ use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, S
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::{Scene, SceneError};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
-use crate::inference::detection::nights;
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
+use crate::star::observation::nights;
 use crate::star::observation::{Observations, Profile};
 use crate::surface::imaging::Imager;
 use crate::surface::planned::{Assumed, Basis, Marginal, fit};

@@ -57,7 +57,9 @@ impl Marginal {
         let (epochs, profiles) = (misfits.len(), self.design.response().profiles());
         let then = |group: &[usize], quadratic: Quadratic| {
             let quadratic = summed(&quadratic, epochs - group.len(), profiles - group.len(), stellar.len());
-            let others = self.with_zero_points_integrated(&imager.without(group), stellar, quadratic)?;
+            let of_others = imager.without(group);
+            let quadratic = with_night_offsets(&of_others, quadratic)?;
+            let others = self.with_zero_points_integrated(&of_others, stellar, quadratic)?;
             Ok(then(&others))
         };
         let all = self.settled.evidence.without_each(&misfits, &slopes, groups, then)?;
@@ -85,10 +87,7 @@ impl Marginal {
             return Ok(self.expanded(imager, stellar, quadratic));
         }
         let common = imager.common_velocities(quadratic.gradient.len());
-        let columns = DMatrix::from_columns(&common.iter().map(|one| one.of_each.clone()).collect::<Vec<_>>());
-        let of_each = |number: fn(&Common) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
-        let (mean, sd) = (of_each(|one| one.mean_kms), of_each(|one| one.sd_kms));
-        let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
+        let quadratic = with_integrated(quadratic, &common)?;
         Ok(self.expanded(imager, stellar, quadratic))
     }
 
@@ -110,7 +109,7 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
-        match imager.has_common_velocities() {
+        match imager.has_common_velocities() || !imager.night_jitters_kms.is_empty() {
             false => Ok(self.ln_evidence()),
             true => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
         }
@@ -134,7 +133,8 @@ impl Marginal {
     fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
         let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;
-        Ok(summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len()))
+        let quadratic = summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len());
+        with_night_offsets(imager, quadratic)
     }
 
     fn misfits_and_slopes(
@@ -168,6 +168,24 @@ impl Marginal {
     ) -> Vec<DMatrix<f64>> {
         self.design.slopes(imager, &self.values, &self.brightness(basis), stellar)
     }
+}
+
+/// RV offsets of nights are noise of the velocities: they are integrated out of all that is said of these.
+fn with_night_offsets(imager: &Imager, quadratic: Quadratic) -> Result<Quadratic, FieldError> {
+    match imager.night_jitters_kms.is_empty() {
+        true => Ok(quadratic),
+        false => {
+            let offsets = imager.night_offsets(quadratic.gradient.len());
+            with_integrated(quadratic, &offsets)
+        }
+    }
+}
+
+fn with_integrated(quadratic: Quadratic, common: &[Common]) -> Result<Quadratic, FieldError> {
+    let columns = DMatrix::from_columns(&common.iter().map(|one| one.of_each.clone()).collect::<Vec<_>>());
+    let of_each = |number: fn(&Common) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
+    let (mean, sd) = (of_each(|one| one.mean_kms), of_each(|one| one.sd_kms));
+    quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)
 }
 
 impl Design {

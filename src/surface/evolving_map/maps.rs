@@ -99,8 +99,10 @@ impl Design {
 
     /// The epochs around maps of these coefficients (H, epochs), a jitter along these slopes among their noise.
     fn jittered(&self, imager: &Imager, maps: &DMatrix<f64>, slopes: &[DMatrix<f64>], jitter_kms: f64) -> Vec<Epoch> {
-        let jittered =
-            |(epoch, slopes): (Epoch, &DMatrix<f64>)| Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[jitter_kms]);
-        self.epochs(imager, maps).into_iter().zip(slopes).map(jittered).collect()
+        let shares = imager.jitter_share_of_each().into_iter().chain(std::iter::repeat(1.0));
+        let jittered = |((epoch, slopes), share): ((Epoch, &DMatrix<f64>), f64)| {
+            Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[share * jitter_kms])
+        };
+        self.epochs(imager, maps).into_iter().zip(slopes).zip(shares).map(jittered).collect()
     }
 }

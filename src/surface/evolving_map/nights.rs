@@ -189,15 +189,20 @@ impl Modelled {
             let changes = columns.iter().flat_map(|columns| (columns * &alike).as_slice().to_vec());
             depth.iter_mut().zip(changes).for_each(|(depth, change)| *depth += change);
         }
-        let slopes: Vec<f64> =
-            marginal.slopes(imager, basis, &[]).iter().flat_map(|slopes| slopes.iter().copied()).collect();
+        let shares = imager.jitter_share_of_each();
+        let slopes = marginal.slopes(imager, basis, &[]).into_iter().zip(&shares);
+        let slopes: Vec<f64> = slopes.flat_map(|(slopes, share)| (slopes * *share).as_slice().to_vec()).collect();
         let with_jitter = imager.clone().with_zero_points(marginal.assumed.jitter_kms, &slopes);
         let bins: Vec<_> = (0..response.profiles()).map(|k| response.bins(k)).collect();
         let residual: Vec<f64> = depth.iter().zip(&imager.data.depth).map(|(model, data)| model - data).collect();
         let mut weighted = vec![0.0; residual.len()];
         vector::run(Weigh { data: &with_jitter.data, bins: &bins, residual: &residual, weighted: &mut weighted });
         let nuisances = &with_jitter.data.nuisances;
-        let estimates = bins.iter().map(|bins| nuisances.estimate(bins.clone(), &weighted, &mut depth)).collect();
+        let estimate = |(bins, share): (&std::ops::Range<usize>, &f64)| {
+            let estimate = nuisances.estimate(bins.clone(), &weighted, &mut depth);
+            Estimate { zero_point_kms: share * estimate.zero_point_kms, ..estimate }
+        };
+        let estimates = bins.iter().zip(&shares).map(estimate).collect();
         Modelled { depth, bins, estimates }
     }
 

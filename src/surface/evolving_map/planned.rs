@@ -88,16 +88,17 @@ impl<'a> Planned<'a> {
         let brightness = self.design.brightness(&self.basis, maps);
         let slopes = self.design.slopes(self.imager, &self.values, &brightness, &self.stellar());
         let slopes = self.design.condensed(&slopes);
-        let noisy = |(epoch, slopes): (Epoch, DMatrix<f64>)| {
+        let shares = self.imager.jitter_share_of_each().into_iter().chain(std::iter::repeat(1.0));
+        let noisy = |((epoch, slopes), share): ((Epoch, DMatrix<f64>), f64)| {
             let misfit = DVector::zeros(epoch.len());
             let mut epoch = Epoch { slopes: slopes.columns(0, 1).into_owned(), misfit, ..epoch };
             if self.assumed.jitter_kms > 0.0 {
-                epoch = epoch.jittered(&[self.assumed.jitter_kms]);
+                epoch = epoch.jittered(&[share * self.assumed.jitter_kms]);
             }
             // where ln Z would be expanded says nothing of information
             Epoch { slopes, divisor: DVector::zeros(0), ..epoch }
         };
-        let all = self.design.epochs(self.imager, maps).into_iter().zip(slopes);
+        let all = self.design.epochs(self.imager, maps).into_iter().zip(slopes).zip(shares);
         all.skip(profiles.start).take(profiles.len()).map(noisy).collect()
     }
 

@@ -27,7 +27,7 @@ use crate::star::{BrightnessModel, Size, StarSettings};
 use crate::surface::Known;
 use grid::resolve_grid;
 use imaging::{check_brightness, check_imaging, resolve_field};
-use observations::resolve_sets;
+use observations::{has_own_jitters, largest_jitter_kms, resolve_sets};
 use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
 use photometry::resolve_photometry;
@@ -145,6 +145,9 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
 /// or for planets.
 fn resolve_jitter(written: &mut Config) -> VelocityJitter {
     let objective = written.imaging.objective;
+    if has_own_jitters(written) {
+        return VelocityJitter::Number(largest_jitter_kms(&written.observations.sections));
+    }
     let sections = &mut written.observations.sections;
     let jitter = sections[0].velocity_jitter_kms.unwrap_or(VelocityJitter::usual(objective));
     // that of all data sets

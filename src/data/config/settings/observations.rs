@@ -39,6 +39,10 @@ pub struct DataSetSettings {
     pub source: ObservationSource,
     /// Line and continuum of each profile.
     pub nuisances: Option<LineAndContinuum>,
+    /// Its RV jitter over the largest of all sets.
+    pub jitter_share: f64,
+    /// Standard deviation of the RV offsets of nights (km/s).
+    pub night_jitter_kms: f64,
     /// Velocity that all profiles have too much.
     pub zero_point: ZeroPoint,
     /// Windows of time (d) whose profiles are left out.
@@ -98,6 +102,7 @@ pub(super) fn resolve_sets(
     check_several(written)?;
     let mut sets = Vec::new();
     let has_field = written.imaging.objective.properties().has_field;
+    let largest_kms = largest_jitter_kms(&written.observations.sections);
     for s in 0..written.observations.sections.len() {
         let key = written.observations.key(s);
         let star = star_of(written, s, &key, star, values)?;
@@ -118,7 +123,16 @@ pub(super) fn resolve_sets(
             };
             return Err(Fault::new(format!("{key}.contrast"), problem));
         }
+        let night_jitter_kms = section.night_jitter_kms.unwrap_or(0.0);
+        check_jitter(&format!("{key}.night_jitter_kms"), night_jitter_kms)?;
+        if night_jitter_kms > 0.0 && !has_field {
+            let problem = "no effect but with imaging.objective \"marginal-likelihood\"";
+            return Err(Fault::new(format!("{key}.night_jitter_kms"), problem));
+        }
+        let own_kms = section.velocity_jitter_kms.and_then(|jitter| jitter.number());
         sets.push(DataSetSettings {
+            jitter_share: own_kms.filter(|_| largest_kms > 0.0).map_or(1.0, |kms| kms / largest_kms),
+            night_jitter_kms,
             regions: section.regions.map(|_| star.regions),
             limb_darkening: section.limb_darkening.as_ref().map(|_| star.limb_darkening),
             fits_contrast,
@@ -152,6 +166,19 @@ fn events(written: Option<&EventsKey>, has_field: bool, key: &str) -> Result<Opt
     }
 }
 
+/// Whether each data set has a jitter of its own.
+pub(super) fn has_own_jitters(written: &Config) -> bool {
+    let sections = &written.observations.sections;
+    let is_number = |section: &ObservationsSection| section.velocity_jitter_kms.is_some_and(|jitter| !jitter.is_word());
+    written.imaging.objective.properties().has_field && sections.iter().all(is_number)
+}
+
+/// The largest number among the jitters of data sets (km/s).
+pub(super) fn largest_jitter_kms(sections: &[ObservationsSection]) -> f64 {
+    let numbers = sections.iter().filter_map(|section| section.velocity_jitter_kms?.number());
+    numbers.fold(0.0, f64::max)
+}
+
 /// What several sets need, and what one has no use for.
 fn check_several(written: &Config) -> Result<(), Fault> {
     let sections = &written.observations.sections;
@@ -180,8 +207,12 @@ fn check_several(written: &Config) -> Result<(), Fault> {
             let problem = "an image of bright and dark pixels is as bright in every data set";
             return Err(Fault::new(format!("{key}.{name}"), problem));
         }
-        if section.velocity_jitter_kms != sections[0].velocity_jitter_kms {
-            let problem = format!("must be as in {}: the jitter is one of all data sets", written.observations.key(0));
+        if section.velocity_jitter_kms != sections[0].velocity_jitter_kms && !has_own_jitters(written) {
+            let first = written.observations.key(0);
+            let problem = match objective.properties().has_field {
+                true => format!("must be as in {first}, or a number in every data set"),
+                false => format!("must be as in {first}: all data sets share one jitter"),
+            };
             return Err(Fault::new(format!("{key}.velocity_jitter_kms"), problem));
         }
         if section.simulate.is_some() != sections[0].simulate.is_some() {

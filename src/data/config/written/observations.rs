@@ -48,10 +48,15 @@ pub struct ObservationsSection {
     pub weights: Weights,
     /// RV jitter (km/s): standard deviation of a Gaussian velocity offset per profile. It should be small compared with
     /// the width of the local line. "fitted": fitted to the profiles, under a static map once at the config's values.
-    /// If not given, "fitted" with the objective "marginal-likelihood", 0 with the others. All data sets share one
-    /// value.
+    /// If not given, "fitted" with the objective "marginal-likelihood", 0 with the others. Fitted, all data sets share
+    /// one value; a number for each set is taken with the objective "marginal-likelihood".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_jitter_kms: Option<VelocityJitter>,
+    /// RV offset that all profiles of one night share: its standard deviation from night to night (km/s), such as the
+    /// scatter of nightly means of an RV standard; 0 if not given. Marginalised over with objective
+    /// "marginal-likelihood". It is not fitted: planets with periods of several days look like night-to-night offsets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub night_jitter_kms: Option<f64>,
     /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resolving_power: Option<f64>,
