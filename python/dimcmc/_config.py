@@ -287,7 +287,7 @@ def _at(values: dict[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
 
 
 def _plain(value: Any, path: tuple[str, ...]) -> Any:
-    """As JSON has it: also numbers and arrays of numpy, quantities of astropy, paths, and sections of another config."""
+    """As JSON has it: also numbers and arrays of numpy, quantities of astropy, paths, sections of another config."""
     if getattr(value, "unit", None) is not None:
         # the prior of a parameter has its unit
         name = next((key for key in reversed(path) if _units.unit_of(key)), path[-1])

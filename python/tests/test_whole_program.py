@@ -121,7 +121,10 @@ def test_an_injected_orbit_is_recovered(simulation: dimcmc.Simulation, tmp_path:
     config = injected.config
     config.planet = {**orbit, "k_kms": 0.8}
     assert dimcmc.map(config).summary.chi2_per_datum == pytest.approx(1.0, abs=0.2)
-    wrongs: list[tuple[dict[str, Any], str]] = [({"k_kms": -1.0}, r"^k_kms: must be from 0"), ({"porb_over_prot": 0.0}, "^porb_over_prot")]
+    wrongs: list[tuple[dict[str, Any], str]] = [
+        ({"k_kms": -1.0}, r"^k_kms: must be from 0"),
+        ({"porb_over_prot": 0.0}, "^porb_over_prot"),
+    ]
     for wrong, words in wrongs:
         with pytest.raises(ValueError, match=words):
             dimcmc.inject(SMALL, **{**orbit, **wrong})
@@ -174,6 +177,7 @@ def test_a_grid_in_numbers(grid: dimcmc.Grid, tmp_path: Path) -> None:
     assert abs(grid.axes["phi"][best[1]] - 0.5) < 0.15
     vertex = grid.paraboloid.parameters.k_kms
     assert abs(vertex.vertex - 0.3) < 5.0 * vertex.error
+    assert grid.figure_data()["log_likelihood"].shape == grid.shape
     (tmp_path / "star.json").write_text(json.dumps(GRID))
     printed = command("grid", "star.json", "--out", "grid", cwd=tmp_path)
     assert files(tmp_path / "grid")["landscape.jsonl"] == files(grid.folder)["landscape.jsonl"]

@@ -1,5 +1,5 @@
-//! Detection limits of a scene: the planet-free star, injected orbits of every period, semi-amplitude and phase, some of
-//! them through the full pipeline, and the files of [`limits`](super::limits).
+//! Detection limits of a scene: the planet-free star, injected orbits of every period, semi-amplitude and phase, some
+//! of them through the full pipeline, and the files of [`limits`](super::limits).
 
 use super::blind_search::{BlindSearchError, BlindSearchOptions};
 use super::limits::{
