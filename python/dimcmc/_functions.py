@@ -114,10 +114,8 @@ def inject(
     orbit = (float(_units.number("k_kms", k_kms)), float(porb_over_prot), float(phi))
     with _folder(out, force) as (folder, scratch), shown("inject", progress) as show, _by_keyword():
         manner = (_threads(threads), show)
-        said, sets = _core.inject(text, _arrays(observations), orbit, os.fspath(folder), manner)
-    injection = Injection(folder, said, scratch)
-    injection._sets = [Observations._of(arrays) for arrays in sets]
-    return injection
+        said = _core.inject(text, _arrays(observations), orbit, os.fspath(folder), manner)
+    return Injection(folder, said, scratch)
 
 
 def map(

@@ -320,13 +320,18 @@ class Simulation(Result):
     @property
     def observations(self) -> Observations:
         """The profiles, for ``observations=`` of other calls; there is one data set."""
-        if len(self._sets) > 1:
-            raise ValueError(f"{len(self._sets)} data sets: see `sets`, or the folders in {self.folder}")
-        return self._sets[0]
+        if len(self.sets) > 1:
+            raise ValueError(f"{len(self.sets)} data sets: see `sets`, or the folders in {self.folder}")
+        return self.sets[0]
 
     @property
     def sets(self) -> list[Observations]:
         """The profiles of each data set."""
+        if self._sets is None:
+            places = self._places(self.folder)
+            if not places:
+                raise ValueError(f"{self.folder}: other folders are beside those of the data sets")
+            self._sets = [Observations.open(place / "observations.txt") for place in places]
         return list(self._sets)
 
     @property
@@ -336,7 +341,7 @@ class Simulation(Result):
 
     _FILE = "truth.json"
 
-    _sets: list[Observations]
+    _sets: list[Observations] | None = None
 
     @classmethod
     def open(cls: type[_S], folder: str | os.PathLike[str]) -> _S:
@@ -356,7 +361,6 @@ class Simulation(Result):
         if not cls._is_in(folder):
             raise ValueError(f"{folder}: no truth.json that dimcmc.{cls.__name__} reads")
         opened = cls(folder, "")
-        opened._sets = [Observations.open(place / "observations.txt") for place in cls._places(folder)]
         opened._text = opened._summarised()
         return opened
 
@@ -381,7 +385,7 @@ class Simulation(Result):
     def _summarised(self) -> str:
         lines: list[tuple[str, str]] = []
         places = self._places(self.folder)
-        for place, one in zip(places, self._sets):
+        for place, one in zip(places, self.sets):
             truth = self._json(os.fspath(place.relative_to(self.folder) / self._FILE))
             noise = "without noise" if truth.snr is None else f"S/N {truth.snr:g}, seed {truth.seed}"
             lines += [("data set", place.name)] if len(places) > 1 else []
@@ -414,7 +418,7 @@ class Injection(Simulation):
         largest = max(abs(velocity) for truth in truths for velocity in truth.velocity_kms)
         orbit = truths[0].injected
         words = f"K {orbit.k_kms:g} km/s, Porb/Prot {orbit.porb_over_prot:g}, phi {orbit.phi:g}"
-        count = sum(len(one) for one in self._sets)
+        count = sum(len(truth.times_d) for truth in truths)
         return _labelled([("profiles", f"{count}, shifted by up to {largest:.4f} km/s"), ("orbit", words)])
 
 

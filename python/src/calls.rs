@@ -181,27 +181,26 @@ pub fn limits(
     })
 }
 
-/// `dimcmc inject`: the text, and the profiles of each data set.
+/// `dimcmc inject`.
 #[pyfunction]
-pub fn inject<'py>(
-    py: Python<'py>,
+pub fn inject(
+    py: Python,
     config: ConfigText,
     observations: Option<Arrays>,
     orbit: (f64, f64, f64),
     out: PathBuf,
     manner: Manner,
-) -> PyResult<(String, Vec<NewArrays<'py>>)> {
+) -> PyResult<String> {
     let source = Source::new(py, config, observations)?;
     let (k_kms, porb_over_prot, phi) = orbit;
-    let (said, sets) = attend(py, manner.0, manner.1, move |job| {
+    attend(py, manner.0, manner.1, move |job| {
         job.say("injecting");
         let scene = source.scene(None)?;
         let injected = Injected::of(&scene, Orbit { k_kms, porb_over_prot, phi })?;
         create(job, &out)?;
         injected.write(&out)?;
-        Ok((text(&injected.lines()), injected.sets().to_vec()))
-    })?;
-    Ok((said, sets.iter().map(|set| arrays(py, set)).collect::<PyResult<_>>()?))
+        Ok(text(&injected.lines()))
+    })
 }
 
 /// How `grid` begins: replacing another one, going on with it; how many of the highest nodes, and those within how many

@@ -122,7 +122,7 @@ pub fn check_observations(observations: Arrays) -> PyResult<()> {
 
 /// Reads the profiles that a list names.
 #[pyfunction]
-pub fn read_observations(py: Python, list: PathBuf) -> PyResult<NewArrays<'_>> {
+pub fn read_observations(py: Python<'_>, list: PathBuf) -> PyResult<NewArrays<'_>> {
     arrays(py, &dimcmc::read_observations(&list).map_err(Fault::from)?)
 }
 

@@ -76,11 +76,6 @@ impl<'a> Injected<'a> {
         Ok(Injected { scene, orbit, sets, velocity_kms })
     }
 
-    /// The profiles of each data set.
-    pub fn sets(&self) -> &[Observations] {
-        &self.sets
-    }
-
     /// Writes `observations.txt`, the profiles that it lists and `truth.json` into `folder`, which must exist, of
     /// several data sets each into a folder of its name there; and `config.json`.
     ///
