@@ -161,18 +161,24 @@ pub mod internals {
     }
 }
 
-pub use cli::{Failure, main as command_line};
+pub use cli::{Failure, first_config, main as command_line};
 pub use data::config::{Config, ConfigError};
-pub use data::io::lsd::{LsdError, write_numbers as write_observations};
+pub use data::io::lsd::{LsdError, read_observations, write_numbers as write_observations};
 pub use data::scene::{Scene, SceneError};
 pub use figures::drawing::Figure;
 pub use figures::plot::{PlotError, figures};
+pub use figures::printed::printed;
+pub use figures::report::{is_page as is_report, report};
 pub use inference::search::{Found, Progress};
 pub use model::{Parameter, Prior};
 pub use planets::periodogram::FrequencySettings;
 pub use planets::verdict::{Finding, Remark, Signal, Verdict};
 pub use runs::blind_search::{BlindSearch, BlindSearchError, BlindSearchOptions, RobustnessOf, SearchSummary};
+pub use runs::detection_limits::{DetectionLimits, LimitsError, LimitsOptions, LimitsProgress};
 pub use runs::export::{ExportError, Format, export};
+pub use runs::grid_scan::{GridScan, GridScanError};
+pub use runs::injected::{InjectError, Injected};
+pub use runs::limits::BestOrbit;
 pub use runs::log_posterior::LogPosterior;
 pub use runs::manifest::RunSummary;
 pub use runs::maps::{MapError, Maps};
@@ -183,6 +189,7 @@ pub use runs::run::{Conclusion, Meter, Pace, Run, RunError, StartFrom};
 pub use runs::simulated::{SimulateError, Simulated};
 pub use sampling::chain::{Chain, ParameterSummary, Record, Summary};
 pub use sampling::ensemble::{EnsembleError, SamplerSettings, StopReason, sample};
+pub use sampling::landscape::Rule as ParaboloidRule;
 pub use sampling::log_density::{Evaluation, LogDensity, Status};
 pub use sampling::optimise::Optimum;
 pub use star::Orbit;

@@ -10,29 +10,56 @@ A config says which star, which profiles and which parameters are free; the func
 ==================  =========================================================
 `Config`            star, observations, image, free parameters, sampler
 `Observations`      line profiles as arrays
+`init`              a first config for observed profiles
 `plan`              which planets would profiles show that are not yet taken?
 `simulate`          profiles of a star with spots and a planet
+`inject`            observed profiles with the signal of a planet
 `map`               the spots, and whether the model fits
 `periodogram`       is there a planet, at which period?
+`limits`            which planets would the profiles show?
 `optimise`          the best parameters and their error bars
+`grid`              a likelihood grid and its paraboloid
 `sample`            the posterior; a `Run`, also of the command line
+`report`            one HTML page of a star
+`open`              any folder of results, also of the command line
 `LogPosterior`      the same density for emcee, zeus, dynesty, nautilus
 ==================  =========================================================
 
-Velocities are in km/s, times and periods in days, angles in degrees, as their names say.
+Velocities are in km/s, times and periods in days, angles in degrees, as their names say. Quantities of astropy are
+converted to these.
 """
 
 from ._config import Config, Section
 from ._core import __version__
-from ._functions import map, optimise, periodogram, plan, sample, simulate
+from ._folders import Batch, open, report
+from ._functions import grid, inject, limits, map, optimise, periodogram, plan, sample, simulate
+from ._init import init
 from ._observations import Observations
 from ._posterior import LogPosterior
-from ._results import Figure, Maps, Optimum, Periodogram, Plan, Record, Result, Simulation
+from ._results import (
+    Comparison,
+    Figure,
+    Grid,
+    Injection,
+    Limits,
+    Maps,
+    Optimum,
+    Periodogram,
+    Plan,
+    Record,
+    Result,
+    Simulation,
+)
 from ._run import Run
 
 __all__ = [
+    "Batch",
+    "Comparison",
     "Config",
     "Figure",
+    "Grid",
+    "Injection",
+    "Limits",
     "LogPosterior",
     "Maps",
     "Observations",
@@ -45,10 +72,16 @@ __all__ = [
     "Section",
     "Simulation",
     "__version__",
+    "grid",
+    "init",
+    "inject",
+    "limits",
     "map",
+    "open",
     "optimise",
     "periodogram",
     "plan",
+    "report",
     "sample",
     "simulate",
 ]

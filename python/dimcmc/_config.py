@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from . import _core
+from . import _core, _text, _units
 
 __all__ = ["Config", "Section"]
 
@@ -75,7 +75,7 @@ class Section(Mapping[str, Any]):
         return {key: value.to_dict() if isinstance(value, Section) else value for key, value in self.items()}
 
     def __repr__(self) -> str:
-        return f"{'.'.join(self._path) or 'config'}: {json.dumps(self.to_dict(), indent=2)}"
+        return _text.screen(f"{'.'.join(self._path) or 'config'}\n{_text.sections(self.to_dict())}", "see to_dict()")
 
 
 class Config:
@@ -89,7 +89,8 @@ class Config:
     source : dict, str, path or Config
         Keys and values; the same as JSON text, which begins with a brace; or the path of a JSON file. Paths in the
         config start from the folder of that file, or else from the working directory. Where profiles are at hand as
-        `Observations`, nothing need be said of them.
+        `Observations`, nothing need be said of them. Numbers are in the units of their keys; quantities of astropy
+        are converted to them.
 
     Raises
     ------
@@ -120,11 +121,13 @@ class Config:
     _json: dict[str, Any]
     _resolved: dict[str, Any]
     _path: str | None
+    _sources: str | None = None
 
     def __init__(self, source: Mapping[str, Any] | str | os.PathLike[str] | Config) -> None:
         path: str | None = None
         if isinstance(source, Config):
             value, path = source._json, source._path
+            self._say(source._sources)
         elif isinstance(source, Mapping):
             value = dict(source)
         elif isinstance(source, str) and source.lstrip().startswith("{"):
@@ -145,6 +148,14 @@ class Config:
     def _keep(self, value: dict[str, Any], resolved: dict[str, Any], path: str | None) -> None:
         for name, content in [("_json", value), ("_resolved", resolved), ("_path", path)]:
             object.__setattr__(self, name, content)
+
+    def _say(self, sources: str | None) -> None:
+        object.__setattr__(self, "_sources", sources)
+
+    @property
+    def sources(self) -> str | None:
+        """What `init` printed: each value with its source, then notes; None of a config from elsewhere."""
+        return self._sources
 
     def _set(self, path: tuple[str, ...], value: Any) -> None:
         """Put a value at a path of keys, if the whole makes sense then."""
@@ -240,13 +251,17 @@ class Config:
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restore, (self._json, self._path)
+        return _restore, (self._json, self._path, self._sources)
+
+    def __str__(self) -> str:
+        return self.to_json()
 
     def __repr__(self) -> str:
-        return f"Config({self.to_json()})"
+        head = "Config" if self._path is None else f"Config {self._path}"
+        return _text.screen(f"{head}\n{_text.sections(self._json)}")
 
     def _repr_html_(self) -> str:
-        return f"<pre>{html.escape(self.to_json())}</pre>"
+        return f"<pre>{html.escape(repr(self))}</pre>"
 
 
 _ABSENT = object()
@@ -255,9 +270,10 @@ _ABSENT = object()
 _IN_MEMORY = "profiles in memory"
 
 
-def _restore(value: dict[str, Any], path: str | None) -> Config:
+def _restore(value: dict[str, Any], path: str | None, sources: str | None) -> Config:
     config = Config.__new__(Config)
     config._keep(*_checked(value, path), path)
+    config._say(sources)
     return config
 
 
@@ -271,7 +287,11 @@ def _at(values: dict[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
 
 
 def _plain(value: Any, path: tuple[str, ...]) -> Any:
-    """As JSON has it: also numbers and arrays of numpy, paths, and sections of another config."""
+    """As JSON has it: also numbers and arrays of numpy, quantities of astropy, paths, sections of another config."""
+    if getattr(value, "unit", None) is not None:
+        # the prior of a parameter has its unit
+        name = next((key for key in reversed(path) if _units.unit_of(key)), path[-1])
+        value = _units.number(name, value)
     if isinstance(value, Section):
         return value.to_dict()
     if isinstance(value, Mapping):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, _units
 
 __all__ = ["Observations"]
 
@@ -37,7 +37,12 @@ class Observations:
     ------
     ValueError
         Arrays of shapes that do not fit, velocities that do not grow evenly, numbers that are not finite, errors that
-        are not above 0, fewer than two profiles.
+        are not above 0, fewer than two profiles, quantities of another kind.
+
+    Notes
+    -----
+    Numbers are in the units above. Quantities of astropy are converted to them, and `astropy.time.Time` to Julian
+    dates on its own scale.
 
     Examples
     --------
@@ -46,6 +51,10 @@ class Observations:
     >>> line = 1.0 - 0.1 * np.exp(-0.5 * (velocities_kms / 20.0) ** 2)
     >>> dimcmc.Observations([0.0, 0.4, 1.1], velocities_kms, np.tile(line, (3, 1)), 1e-3)
     Observations: 3 profiles of 61 bins, -60 to 60 km/s, 0 to 1.1 d
+
+    With astropy, any unit of velocity and time:
+
+    >>> dimcmc.Observations(times, velocities.to("m/s"), intensity, sigma)       # doctest: +SKIP
     """
 
     __slots__ = ("first_velocity_kms", "intensity", "sigma", "step_kms", "times_d")
@@ -101,6 +110,46 @@ class Observations:
         """What the engine takes."""
         return self.times_d, self.first_velocity_kms, self.step_kms, self.intensity, self.sigma
 
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> Observations:
+        """Read the profiles that a list names, as ``observations.path`` of a config does.
+
+        Parameters
+        ----------
+        path : str or path
+            The list, one profile per line: file, time (d), and optionally the velocity to subtract (km/s).
+
+        Returns
+        -------
+        Observations
+
+        Raises
+        ------
+        ValueError
+            No list there, or profiles that cannot be read; the message names the file and line.
+        """
+        return cls._of(_core.read_observations(os.fspath(path)))
+
+    def quantity(self, name: str) -> Any:
+        """One of the arrays as a quantity of astropy, which must be installed.
+
+        Parameters
+        ----------
+        name : {"times_d", "velocities_kms", "intensity", "sigma"}
+            Which one.
+
+        Returns
+        -------
+        astropy.units.Quantity
+
+        Examples
+        --------
+        >>> profiles.quantity("velocities_kms").to("m/s")                         # doctest: +SKIP
+        """
+        if name not in ("times_d", "velocities_kms", "intensity", "sigma"):
+            raise ValueError(f"name: must be times_d, velocities_kms, intensity or sigma, not {name!r}")
+        return _units.quantity(getattr(self, name), _units.unit_of(name) or "")
+
     @property
     def velocities_kms(self) -> NDArray[np.float64]:
         """Velocities of all bins (km/s), shape (profiles, bins)."""
@@ -137,6 +186,7 @@ class Observations:
 
 
 def _floats(name: str, values: ArrayLike, dimensions: tuple[int, ...]) -> NDArray[np.float64]:
+    values = _units.number(name, values, _units.unit_of(name) or "")
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -48,6 +48,9 @@ def arrays(result: Result, name: str) -> Arrays:
     if name in _CHAIN:
         chain: Array = getattr(result, "chain")
         return {of: chain[..., k] for k, of in enumerate(getattr(result, "names"))}
+    if name == "landscape":
+        axes: Arrays = getattr(result, "axes")
+        return {**axes, "log_likelihood": getattr(result, "log_likelihood")}
     if name == "optimum":
         best = result._json("optimum.json")
         values = [np.array([best[key][of] for of in best.names]) for key in ("parameters", "sd")]

@@ -17,12 +17,27 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core, _plots
+from . import _core, _plots, _text
+from ._config import Config
 from ._observations import Observations
 
-__all__ = ["Figure", "Maps", "Optimum", "Periodogram", "Plan", "Record", "Result", "Simulation"]
+__all__ = [
+    "Comparison",
+    "Figure",
+    "Grid",
+    "Injection",
+    "Limits",
+    "Maps",
+    "Optimum",
+    "Periodogram",
+    "Plan",
+    "Record",
+    "Result",
+    "Simulation",
+]
 
 _R = TypeVar("_R", bound="Result")
+_S = TypeVar("_S", bound="Simulation")
 
 
 class Record(dict[str, Any]):
@@ -40,6 +55,9 @@ class Record(dict[str, Any]):
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self]
+
+    def __repr__(self) -> str:
+        return _text.values(self)
 
 
 class Figure:
@@ -117,6 +135,37 @@ class Result:
         self.folder = folder
         self._text = text
         self._scratch = scratch
+
+    @classmethod
+    def open(cls: type[_R], folder: str | os.PathLike[str]) -> _R:
+        """Read the results of this kind in a folder; `dimcmc.open` finds the kind.
+
+        Parameters
+        ----------
+        folder : str or path
+            What a call with ``out=``, or the command line, wrote into.
+
+        Raises
+        ------
+        ValueError
+            No results of this kind there, or broken ones.
+        """
+        folder = Path(folder)
+        if not cls._FILE or not cls._is_in(folder):
+            raise ValueError(f"{folder}: no {cls._FILE or 'results'}, which dimcmc.{cls.__name__} reads")
+        text = _core.printed(os.fspath(folder), cls._FILE)
+        opened = cls(folder, "")
+        opened._text = opened._summarised() if text is None else text
+        return opened
+
+    @classmethod
+    def _is_in(cls, folder: Path) -> bool:
+        """Whether a folder is of this kind."""
+        return (folder / cls._FILE).is_file()
+
+    def _summarised(self) -> str:
+        """The text of results that were opened, where the files do not hold all that was printed."""
+        return ""
 
     @property
     def figures(self) -> list[str]:
@@ -209,9 +258,7 @@ class Result:
         shutil.copytree(self.folder, folder, dirs_exist_ok=True)
 
     def _json(self, name: str) -> Record:
-        text = (self.folder / name).read_text(encoding="utf-8")
-        content: Record = json.loads(text, object_hook=Record)
-        return content
+        return _read(self.folder / name)
 
     def _table(self, name: str) -> dict[str, NDArray[np.float64]]:
         """The columns of a table, by name."""
@@ -224,10 +271,15 @@ class Result:
         return self._text
 
     def __repr__(self) -> str:
-        return f"<dimcmc.{type(self).__name__} in {self.folder}>\n{self._text}"
+        return _text.screen(f"<dimcmc.{type(self).__name__} in {self.folder}>\n{self._text}")
 
     def _repr_html_(self) -> str:
-        return f"<pre>{html.escape(self._text)}</pre>{self.figure(dpi=100.0)._img()}"
+        try:
+            figure = self.figure(dpi=100.0)._img()
+        except ValueError:
+            # several data sets have their figures in folders of their names
+            figure = ""
+        return f"<pre>{html.escape(self._text)}</pre>{figure}"
 
     def __reduce__(self) -> tuple[Any, ...]:
         files = {
@@ -236,6 +288,20 @@ class Result:
             if path.is_file()
         }
         return _restored, (type(self), files, self._text)
+
+
+def _read(path: Path) -> Record:
+    try:
+        content: Record = json.loads(path.read_text(encoding="utf-8"), object_hook=Record)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    return content
+
+
+def _labelled(lines: list[tuple[str, str]]) -> str:
+    """Labels and texts, a line each, labels padded, as calls print them."""
+    width = max(len(label) for label, _ in lines)
+    return "\n".join(f"{label:{width}}  {text}" for label, text in lines)
 
 
 def _restored(kind: type[_R], files: Mapping[str, bytes], text: str) -> _R:
@@ -254,13 +320,18 @@ class Simulation(Result):
     @property
     def observations(self) -> Observations:
         """The profiles, for ``observations=`` of other calls; there is one data set."""
-        if len(self._sets) > 1:
-            raise ValueError(f"{len(self._sets)} data sets: see `sets`, or the folders in {self.folder}")
-        return self._sets[0]
+        if len(self.sets) > 1:
+            raise ValueError(f"{len(self.sets)} data sets: see `sets`, or the folders in {self.folder}")
+        return self.sets[0]
 
     @property
     def sets(self) -> list[Observations]:
         """The profiles of each data set."""
+        if self._sets is None:
+            places = self._places(self.folder)
+            if not places:
+                raise ValueError(f"{self.folder}: other folders are beside those of the data sets")
+            self._sets = [Observations.open(place / "observations.txt") for place in places]
         return list(self._sets)
 
     @property
@@ -268,7 +339,59 @@ class Simulation(Result):
         """What they were made with: parameters, spots, noise (`truth.json`); there is one data set."""
         return self._json("truth.json")
 
-    _sets: list[Observations]
+    _FILE = "truth.json"
+
+    _sets: list[Observations] | None = None
+
+    @classmethod
+    def open(cls: type[_S], folder: str | os.PathLike[str]) -> _S:
+        """Read what `simulate` or `inject` wrote.
+
+        Parameters
+        ----------
+        folder : str or path
+            The folder with `truth.json`, or with a folder for each data set.
+
+        Raises
+        ------
+        ValueError
+            No such profiles there, or broken ones.
+        """
+        folder = Path(folder)
+        if not cls._is_in(folder):
+            raise ValueError(f"{folder}: no truth.json that dimcmc.{cls.__name__} reads")
+        opened = cls(folder, "")
+        opened._text = opened._summarised()
+        return opened
+
+    @classmethod
+    def _places(cls, folder: Path) -> list[Path]:
+        """The folders of the data sets: the folder itself, or all in it."""
+        inside = [folder] if (folder / cls._FILE).is_file() else sorted(p for p in folder.glob("*") if p.is_dir())
+        files = ("observations.txt", cls._FILE)
+        several = len(inside) > 1 or inside == [folder]
+        if not several or not all((place / file).is_file() for place in inside for file in files):
+            return []
+        # in the order of the config
+        sections = _read(inside[0] / cls._FILE).get("config", {}).get("observations", [])
+        order = [one.get("name") for one in sections] if isinstance(sections, list) else []
+        return sorted(inside, key=lambda place: order.index(place.name) if place.name in order else len(order))
+
+    @classmethod
+    def _is_in(cls, folder: Path) -> bool:
+        truths = [_read(place / cls._FILE) for place in cls._places(folder)]
+        return bool(truths) and ("injected" in truths[0]) == issubclass(cls, Injection)
+
+    def _summarised(self) -> str:
+        lines: list[tuple[str, str]] = []
+        places = self._places(self.folder)
+        for place, one in zip(places, self.sets):
+            truth = self._json(os.fspath(place.relative_to(self.folder) / self._FILE))
+            noise = "without noise" if truth.snr is None else f"S/N {truth.snr:g}, seed {truth.seed}"
+            lines += [("data set", place.name)] if len(places) > 1 else []
+            lines.append(("profiles", f"{len(one)} of {one.intensity.shape[1]} bins, {noise}"))
+            lines.append(("spottedness", f"{truth.spottedness:.5f}"))
+        return _labelled(lines)
 
     def __reduce__(self) -> tuple[Any, ...]:
         make, arguments = super().__reduce__()
@@ -278,8 +401,38 @@ class Simulation(Result):
         self._sets = state["_sets"]
 
 
+class Injection(Simulation):
+    """Observed profiles with an injected orbit, from `inject`; of several data sets each in a folder of its name.
+
+    Its `truth` is the orbit, and the velocity by which each profile was shifted.
+    """
+
+    @property
+    def config(self) -> Config:
+        """The config for these profiles; its start values differ from the injected orbit."""
+        return Config(self.folder / "config.json")
+
+    def _summarised(self) -> str:
+        places = self._places(self.folder)
+        truths = [self._json(os.fspath(place.relative_to(self.folder) / self._FILE)) for place in places]
+        largest = max(abs(velocity) for truth in truths for velocity in truth.velocity_kms)
+        orbit = truths[0].injected
+        words = f"K {orbit.k_kms:g} km/s, Porb/Prot {orbit.porb_over_prot:g}, phi {orbit.phi:g}"
+        count = sum(len(truth.times_d) for truth in truths)
+        return _labelled([("profiles", f"{count}, shifted by up to {largest:.4f} km/s"), ("orbit", words)])
+
+
 class Maps(Result):
     """Maps of the star, from `map`."""
+
+    _FILE = "map.json"
+
+    def _summarised(self) -> str:
+        fit = self.summary
+        per_datum = f"χ²/N = {fit.chi2_per_datum:.4f}"
+        lines = [("chi2", f"{fit.chi2:.2f} for {fit.data} data in {fit.profiles} profiles ({per_datum})")]
+        lines.append(("RV observed", f"{fit.observed_rv_rms_kms:.4f} km/s rms"))
+        return _labelled([*lines, *(("warning", text) for text in fit.get("warnings", []))])
 
     @property
     def summary(self) -> Record:
@@ -304,6 +457,8 @@ class Maps(Result):
 
 class Periodogram(Result):
     """A blind search for a planet, from `periodogram`."""
+
+    _FILE = "periodogram.json"
 
     @property
     def summary(self) -> Record:
@@ -331,8 +486,97 @@ class Periodogram(Result):
         return self._table("periodogram.csv")
 
 
+class Limits(Result):
+    """Detection limits from injection and recovery, from `limits`."""
+
+    _FILE = "limits.json"
+
+    @property
+    def summary(self) -> Record:
+        """Limits, subtracted orbit, comparison with the full pipeline, warnings (`limits.json`)."""
+        return self._json("limits.json")
+
+    @property
+    def periods(self) -> dict[str, NDArray[np.float64]]:
+        """K recovered at 50 and 95 % of the phases (km/s) at every period; NaN beyond the K injected."""
+        limits = self.summary.limits
+        names = ["period_d", "porb_over_prot", "k50_kms", "k95_kms"]
+        return {name: np.array([one[name] for one in limits], dtype=np.float64) for name in names}
+
+    @property
+    def injections(self) -> dict[str, NDArray[np.float64]]:
+        """Phases recovered, for each period and K injected: the columns of `limits.csv`."""
+        return self._table("limits.csv")
+
+
+class Grid(Result):
+    """A likelihood grid with its paraboloid, from `grid`."""
+
+    _FILE = "landscape.json"
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the axes."""
+        return [str(axis.name) for axis in self.summary.grid.axes]
+
+    @property
+    def axes(self) -> dict[str, NDArray[np.float64]]:
+        """The values along each axis."""
+        along: dict[str, NDArray[np.float64]] = {}
+        for axis in self.summary.grid.axes:
+            circle = axis.periodic and abs(axis.max - axis.min - 1.0) < 1e-9
+            values = np.linspace(axis.min, axis.max, axis.nodes, endpoint=not circle)
+            along[axis.name] = values % 1.0 if axis.periodic else values
+        return along
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of nodes along each axis."""
+        return tuple(axis.nodes for axis in self.summary.grid.axes)
+
+    @property
+    def log_likelihood(self) -> NDArray[np.float64]:
+        """ln L at the nodes, an axis of the array for each of the grid; NaN where there is no map, or none yet."""
+        values = np.full(int(np.prod(self.shape)), np.nan)
+        nodes = self.nodes["log_likelihood"]
+        values[: len(nodes)] = nodes
+        return values.reshape(self.shape)
+
+    @property
+    def nodes(self) -> dict[str, NDArray[np.float64]]:
+        """Parameters, ln L and the numbers beside it, for each node so far (`landscape.jsonl`)."""
+        text = (self.folder / "landscape.jsonl").read_text(encoding="utf-8")
+        rows = [json.loads(line) for line in text.split("\n")[:-1]]
+        axes = [axis.name for axis in self.summary.grid.axes]
+        names = [*axes, "log_likelihood", *self.summary.numbers]
+        return {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
+
+    @property
+    def paraboloid(self) -> Record:
+        """Vertex and error bar of each parameter, or why there is none (`paraboloid.json`)."""
+        return self._json("paraboloid.json")
+
+    @property
+    def summary(self) -> Record:
+        """Axes, config and reference (`landscape.json`)."""
+        return self._json("landscape.json")
+
+
+class Comparison(Result):
+    """A chain compared with a likelihood grid, from `dimcmc compare`."""
+
+    _FILE = "comparison.json"
+
+    @property
+    def summary(self) -> Record:
+        """Estimates of each parameter, their differences, and the cost of each (`comparison.json`)."""
+        return self._json("comparison.json")
+
+
 class Plan(Result):
     """Detection limits of schedules, from `plan`."""
+
+    _FILE = "plan.json"
 
     @property
     def summary(self) -> Record:
@@ -347,6 +591,8 @@ class Plan(Result):
 
 class Optimum(Result):
     """Maximum of the posterior with uncertainties, from `optimise`."""
+
+    _FILE = "optimum.json"
 
     @property
     def summary(self) -> Record:

@@ -61,6 +61,8 @@ class Run(Result):
     numbers: dict[str, NDArray[np.float64]]
     summary: Record
 
+    _FILE = "manifest.json"
+
     def __init__(self, folder: Path, text: str | None = None, scratch: Scratch | None = None) -> None:
         content = _core.read_run(os.fspath(folder))
         super().__init__(folder, content["text"], scratch)

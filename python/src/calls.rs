@@ -4,11 +4,13 @@ use crate::fault::Fault;
 use crate::job::{Job, attend, soon};
 use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
 use dimcmc::{
-    BlindSearch, BlindSearchOptions, Failure, Figure, Forecast, Format, FrequencySettings, Maps, OptimumFile,
-    PlanSettings, Scene, Simulated,
+    BestOrbit, BlindSearch, BlindSearchOptions, DetectionLimits, Failure, Figure, Forecast, Format, FrequencySettings,
+    GridScan, Injected, LimitsOptions, LimitsProgress, Maps, OptimumFile, Orbit, ParaboloidRule, PlanSettings, Pool,
+    Scene, Simulated,
 };
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// How a call is carried out: number of threads, and who is told how far it is.
@@ -105,6 +107,179 @@ pub fn periodogram(
         found.write(out)?;
         Ok(found.table().trim_end().to_owned())
     })
+}
+
+/// Options of `limits`.
+#[derive(FromPyObject)]
+pub struct Limits {
+    #[pyo3(item)]
+    min_period_d: Option<f64>,
+    #[pyo3(item)]
+    max_period_d: Option<f64>,
+    #[pyo3(item)]
+    periods: usize,
+    #[pyo3(item)]
+    min_k_kms: Option<f64>,
+    #[pyo3(item)]
+    max_k_kms: Option<f64>,
+    #[pyo3(item)]
+    amplitudes: usize,
+    #[pyo3(item)]
+    phases: usize,
+    #[pyo3(item)]
+    full: usize,
+    /// Whether the best orbit is subtracted; where it is a candidate for `None`.
+    #[pyo3(item)]
+    subtract_best: Option<bool>,
+    #[pyo3(item)]
+    fixed: bool,
+    #[pyo3(item)]
+    draws: usize,
+    #[pyo3(item)]
+    seed: u64,
+}
+
+/// `dimcmc limits`.
+#[pyfunction]
+pub fn limits(
+    py: Python,
+    config: ConfigText,
+    observations: Option<Arrays>,
+    options: Limits,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let Limits { min_period_d, max_period_d, periods, min_k_kms, max_k_kms, amplitudes, phases, full, .. } = options;
+    let options = LimitsOptions {
+        range: FrequencySettings { min_period_d, max_period_d, oversampling: None },
+        periods,
+        min_k_kms,
+        max_k_kms,
+        amplitudes,
+        phases,
+        full,
+        best: match options.subtract_best {
+            None => BestOrbit::OutIfCandidate,
+            Some(true) => BestOrbit::Out,
+            Some(false) => BestOrbit::In,
+        },
+        fixed: options.fixed,
+        draws: options.draws,
+        seed: options.seed,
+    };
+    with_scene(py, Source::new(py, config, observations)?, out, manner, move |job, scene, out| {
+        let pool = Pool::threads(job.stop());
+        let found = DetectionLimits::of(scene, &options, &pool, &|progress| match progress {
+            LimitsProgress::Map => job.say("planet-free map"),
+            LimitsProgress::Injections { done, total } => job.share(done, total, "orbits"),
+            LimitsProgress::Full { done, total } => job.share(done, total, "orbits, full pipeline"),
+        });
+        let found = found.map_err(|error| Failure::limits(scene.path(), error))?;
+        create(job, out)?;
+        found.write(out)?;
+        Ok(found.table().trim_end().to_owned())
+    })
+}
+
+/// `dimcmc inject`.
+#[pyfunction]
+pub fn inject(
+    py: Python,
+    config: ConfigText,
+    observations: Option<Arrays>,
+    orbit: (f64, f64, f64),
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let source = Source::new(py, config, observations)?;
+    let (k_kms, porb_over_prot, phi) = orbit;
+    attend(py, manner.0, manner.1, move |job| {
+        job.say("injecting");
+        let scene = source.scene(None)?;
+        let injected = Injected::of(&scene, Orbit { k_kms, porb_over_prot, phi })?;
+        create(job, &out)?;
+        injected.write(&out)?;
+        Ok(text(&injected.lines()))
+    })
+}
+
+/// How `grid` begins: replacing another one, going on with it; how many of the highest nodes, and those within how many
+/// steps, make the paraboloid.
+type GridOptions = (bool, bool, Option<usize>, Option<usize>);
+
+/// `dimcmc grid`.
+#[pyfunction]
+pub fn grid(
+    py: Python,
+    config: ConfigText,
+    observations: Option<Arrays>,
+    options: GridOptions,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let (replace, resume, nodes, radius) = options;
+    let source = Source::new(py, config, observations)?;
+    attend(py, manner.0, manner.1, move |job| {
+        job.say("profiles");
+        let scene = source.scene(None)?;
+        let plan = scene.settings.require_grid()?;
+        let failed = |error| Fault::from(Failure::grid_scan(scene.path(), error));
+        let mut scan = if resume {
+            job.say("reading the grid, reference image");
+            let scan = GridScan::resume(&scene, plan, &out).map_err(failed)?;
+            job.begin_to_write();
+            scan
+        } else {
+            let scene = scene.clone().fitted(&|what| job.say(what));
+            let found = scene.optimise_over(&plan.free, &|progress| job.search(progress));
+            let found = found.map_err(|error| Failure::search(scene.path(), error))?;
+            job.say("start images for distant nodes");
+            create(job, &out)?;
+            GridScan::begin(&scene, plan, found, &out, replace).map_err(failed)?
+        };
+        let total = scan.landscape.grid().len();
+        let pool = Pool::threads(job.stop());
+        // batches are cut so that the scan ends by itself, with what was finished in time on disk
+        let whole = scan.go(&pool, |landscape| job.count(landscape.nodes().len(), total, "nodes"));
+        if !whole.map_err(failed)? {
+            return Err(Fault::Interrupted(format!(
+                "interrupted after {} nodes; resume with the same call and out={:?}, resume=True",
+                scan.landscape.nodes().len(),
+                out.display().to_string()
+            )));
+        }
+        let notes = scan.header.notes().into_iter().map(|note| format!("note: {note}\n"));
+        let said = scan.conclude(&out, ParaboloidRule { nodes, radius })? + &notes.collect::<String>();
+        Ok(said.trim_end().to_owned())
+    })
+}
+
+/// `dimcmc init` by its arguments: the config, and the table of its values.
+#[pyfunction]
+pub fn init(py: Python, arguments: Vec<OsString>, manner: Manner) -> PyResult<(String, String)> {
+    attend(py, manner.0, manner.1, move |job| {
+        job.say("first look, test fit");
+        Ok(dimcmc::first_config(arguments, &|_| job.go_on())?)
+    })
+}
+
+/// `dimcmc report`: the page.
+#[pyfunction]
+pub fn report(py: Python, folders: Vec<PathBuf>) -> PyResult<String> {
+    Ok(soon(py, || dimcmc::report(&folders).map_err(Fault::from))??)
+}
+
+/// Whether a file is such a page.
+#[pyfunction]
+pub fn is_report(file: PathBuf) -> bool {
+    dimcmc::is_report(&file)
+}
+
+/// What was printed when a file was written into a folder, where the file holds all of it.
+#[pyfunction]
+pub fn printed(py: Python, folder: PathBuf, file: &str) -> PyResult<Option<String>> {
+    let text = soon(py, || dimcmc::printed(&folder, file).map_err(Fault::from))??;
+    Ok(text.map(|text| text.trim_end().to_owned()))
 }
 
 /// Options of `plan`: shortest and longest period, fixed; maps, draws, seed.

@@ -67,6 +67,17 @@ impl Job {
         });
     }
 
+    /// How much is done; ends the computation if it was told to stop.
+    pub fn share(&self, done: usize, total: usize, what: &str) {
+        self.go_on();
+        self.count(done, total, what);
+    }
+
+    /// How much is done of what stops by itself.
+    pub fn count(&self, done: usize, total: usize, what: &str) {
+        self.tell(Some(done as f64 / total.max(1) as f64), format!("{done}/{total} {what}"));
+    }
+
     /// How far a chain has come; it stops by itself.
     pub fn pace(&self, pace: &Pace) {
         let convergence = pace.convergence.as_ref().map(|words| format!(", {words}")).unwrap_or_default();

@@ -4,7 +4,7 @@ use crate::calls::Manner;
 use crate::fault::Fault;
 use crate::job::{attend, soon};
 use crate::scene::{Arrays, ConfigText, Source};
-use dimcmc::{Chain, Conclusion, Failure, Meter, Pool, Run, Scene, StartFrom, StopReason};
+use dimcmc::{Chain, Conclusion, Failure, GridScan, Meter, Pool, Run, Scene, StartFrom, StopReason};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -79,10 +79,10 @@ fn begin(job: &crate::job::Job, scene: &Scene, beginning: Beginning, pool: &Pool
     Ok(Run::in_memory(scene, found, from, pool).map_err(|e| Failure::run(scene.path(), e))?)
 }
 
-/// Whether nothing but the false start of a run is in a folder, which another one may replace.
+/// Whether nothing but the false start of a run or a grid is in a folder, which another one may replace.
 #[pyfunction]
 pub fn is_false_start(folder: PathBuf) -> bool {
-    Run::is_false_start(&folder)
+    Run::is_false_start(&folder) || GridScan::is_false_start(&folder)
 }
 
 /// Reads a run: names, text and summary; draws by name; positions `[step, ensemble, walker, parameter]`,

@@ -120,6 +120,12 @@ pub fn check_observations(observations: Arrays) -> PyResult<()> {
     checked.map_err(|problem| PyValueError::new_err(format!("observations: {problem}")))
 }
 
+/// Reads the profiles that a list names.
+#[pyfunction]
+pub fn read_observations(py: Python<'_>, list: PathBuf) -> PyResult<NewArrays<'_>> {
+    arrays(py, &dimcmc::read_observations(&list).map_err(Fault::from)?)
+}
+
 /// Writes a list and its profiles into a folder.
 #[pyfunction]
 pub fn write_observations(observations: Arrays, folder: PathBuf) -> PyResult<()> {

@@ -88,6 +88,8 @@ def test_the_guides_run(desk: Path, page: str) -> None:
             if samplers == ["dynesty"]:
                 # to its end it would be most of the time of all tests
                 block = quicker(block, ("nlive=500", "nlive=20"), ("run_nested()", "run_nested(maxcall=100)"))
+            if "dimcmc.init(" in block:
+                block = quicker(block, ("inclination=38.0", 'inclination=38.0, objective="spottedness", pixels=200'))
             exec(block, names)
     if "run" in names:
         assert names["run"].summary.steps > 10

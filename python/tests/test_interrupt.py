@@ -61,7 +61,23 @@ def test_a_chain_stops_and_goes_on(tmp_path: Path) -> None:
     assert (gone_on.folder / "chain.jsonl").read_bytes() == (whole.folder / "chain.jsonl").read_bytes()
 
 
-@pytest.mark.parametrize("name", ["sample", "periodogram", "optimise", "map", "LogPosterior"])
+def test_a_grid_stops_and_goes_on(tmp_path: Path) -> None:
+    imaging = {**SMALL["imaging"], "chi2_target": 1.1}
+    star = {**SMALL, "imaging": imaging, "grid": {"axes": {"k_kms": [0.2, 0.4, 20], "phi": [0.45, 0.55, 40]}}}
+    (tmp_path / "star.json").write_text(json.dumps(star))
+    call = "dimcmc.grid('star.json', out='grid', threads=1)"
+    seconds, said = interrupted(call, tmp_path / "grid/landscape.jsonl", tmp_path)
+    assert "KeyboardInterrupt: interrupted after" in said and "resume=True" in said, said
+    assert seconds < 1.5
+    nodes = tmp_path / "grid/landscape.jsonl"
+    assert 40 < nodes.read_bytes().count(b"\n") < 800
+    gone_on = dimcmc.grid(star, out=tmp_path / "grid", resume=True)
+    whole = dimcmc.grid(star)
+    assert nodes.read_bytes() == (whole.folder / "landscape.jsonl").read_bytes()
+    assert gone_on.paraboloid == whole.paraboloid
+
+
+@pytest.mark.parametrize("name", ["sample", "periodogram", "optimise", "map", "limits", "grid", "LogPosterior"])
 def test_long_calls_stop_and_leave_nothing(name: str, tmp_path: Path) -> None:
     star = json.loads((ROOT / "configs/demo.json").read_text())
     star["imaging"]["pixels"] = 20_000

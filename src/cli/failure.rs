@@ -14,8 +14,10 @@ use crate::inference::search::SearchError;
 use crate::planets::periodogram::FrequencyError;
 use crate::runs::blind_search::BlindSearchError;
 use crate::runs::comparison::PairError;
+use crate::runs::detection_limits::LimitsError;
 use crate::runs::export::ExportError;
 use crate::runs::grid_scan::GridScanError;
+use crate::runs::injected::InjectError;
 use crate::runs::maps::MapError;
 use crate::runs::origin::OriginError;
 use crate::runs::plan::{CampaignError, ForecastError, PlanError};
@@ -114,6 +116,15 @@ impl Failure {
             BlindSearchError::Frequencies(error) => Failure::of(error),
             BlindSearchError::Detection(SurfaceError::Reference(error)) => Failure::reference(path, error),
             BlindSearchError::Detection(error) => Failure::failed(format!("{}: {error}", path.display())),
+        }
+    }
+
+    /// No detection limits of the star of the config at `path`.
+    pub fn limits(path: &Path, error: LimitsError) -> Self {
+        match error {
+            LimitsError::Search(error) => Failure::blind_search(path, error),
+            error @ LimitsError::Range { .. } => Failure::input(error.to_string()),
+            error @ (LimitsError::Unbounded(_) | LimitsError::Interrupted) => Failure::failed(error),
         }
     }
 
@@ -217,6 +228,17 @@ impl From<SimulateError> for Failure {
             SimulateError::WriteLight(error) => error.into(),
             error @ SimulateError::Folder { .. } => Failure::failed(error),
             SimulateError::Write(error) => error.into(),
+        }
+    }
+}
+
+impl From<InjectError> for Failure {
+    fn from(error: InjectError) -> Self {
+        match error {
+            error @ InjectError::Orbit { .. } => Failure::input(error.to_string()),
+            error @ InjectError::Folder { .. } => Failure::failed(error),
+            InjectError::Write(error) => error.into(),
+            InjectError::Profiles(error) => error.into(),
         }
     }
 }

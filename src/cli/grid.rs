@@ -6,10 +6,9 @@ use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::config::Config;
 use crate::data::io::effort::{EFFORT, Effort};
-use crate::data::io::paraboloid::ParaboloidFile;
 use crate::numerics::text::shown;
 use crate::runs::grid_scan::{GridScan, HEADER, NODES, PARABOLOID};
-use crate::sampling::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
+use crate::sampling::landscape::{Landscape, Rule};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -84,22 +83,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         )));
     }
     noted?;
-    let GridScan { header, landscape, .. } = &scan;
-    let truth = header.origin.truth.as_ref();
     let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
-    let found = paraboloid(landscape, rule);
-    ParaboloidFile::new(landscape.grid(), rule, truth, &found).write(&folder.join(PARABOLOID))?;
     // whoever reads may stop reading
-    console::print(table(landscape, truth));
-    console::print(paraboloid_table(&found, landscape.grid(), truth));
+    console::print(scan.conclude(folder, rule)?);
     let images = match scan.warm_starts() {
         0 => String::new(),
         others => format!(" from {} images", others + 1),
     };
-    console::line(format_args!("{}{images}", meter.cost(landscape)));
-    let axes: Vec<String> = landscape.grid().names().map(str::to_owned).collect();
-    for warning in header.origin.reference.warnings(&axes) {
-        console::line(format_args!("note: {warning}"));
+    console::line(format_args!("{}{images}", meter.cost(&scan.landscape)));
+    for note in scan.header.notes() {
+        console::line(format_args!("note: {note}"));
     }
     console::line(format_args!("written: {}: {HEADER}, {NODES}, {PARABOLOID}", shown(folder)));
     Ok(())

@@ -10,6 +10,8 @@ use crate::data::io::{FileError, atomic, lsd};
 use crate::numerics::text::shown;
 use crate::star::BrightnessModel;
 use crate::surface::ObjectiveKind;
+use clap::{Args as _, FromArgMatches as _};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles
@@ -238,27 +240,10 @@ impl KnownArgs {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
-    args.output.check(None)?;
-    let lists = &args.observations;
-    for list in lists {
-        args.output.spare(&lsd::files(list), None)?;
-    }
-    args.output.spare(&args.photometry, None)?;
-    let read = |list: &PathBuf| {
-        std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))
-    };
-    let bytes = lists.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    let known = args.known.over(Known::default())?;
-    let place = Place {
-        config: args.output.path(),
-        lists: args.lists(&bytes, &known)?,
-        light_curves: args.light_curves(&known)?,
-        schema: args.output.schema(),
-    };
     let spinner = progress::bar(global, None, "first look, test fit");
-    let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
+    let proposal = args.proposal(&|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
-    let proposal = proposal.map_err(|error| args.known.failure(error, &lists[0]))?;
+    let proposal = proposal?;
     args.output.check(None)?;
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));
@@ -266,7 +251,46 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The first config by the `arguments` of the command, as text, and the table of its values; nothing is written.
+/// `say` is told what looks wrong before the test fit.
+///
+/// # Errors
+/// Arguments that make no sense, and profiles of which no config can be made.
+pub fn first_config(arguments: Vec<OsString>, say: &dyn Fn(&str)) -> Result<(String, String), Failure> {
+    let command = Args::augment_args(clap::Command::new("init").no_binary_name(true));
+    let wrong = |error: clap::Error| {
+        let text = error.to_string();
+        let problem = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ");
+        Failure::input(problem.split_whitespace().collect::<Vec<_>>().join(" "))
+    };
+    let matches = command.try_get_matches_from(arguments).map_err(wrong)?;
+    let proposal = Args::from_arg_matches(&matches).map_err(wrong)?.proposal(say)?;
+    Ok((proposal.json.clone(), proposal.table()))
+}
+
 impl Args {
+    /// The config of these arguments, with where its values come from.
+    fn proposal(&self, say: &dyn Fn(&str)) -> Result<Proposal, Failure> {
+        self.output.check(None)?;
+        let lists = &self.observations;
+        for list in lists {
+            self.output.spare(&lsd::files(list), None)?;
+        }
+        self.output.spare(&self.photometry, None)?;
+        let read = |list: &PathBuf| {
+            std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))
+        };
+        let bytes = lists.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let known = self.known.over(Known::default())?;
+        let place = Place {
+            config: self.output.path(),
+            lists: self.lists(&bytes, &known)?,
+            light_curves: self.light_curves(&known)?,
+            schema: self.output.schema(),
+        };
+        propose(&place, &known, say).map_err(|error| self.known.failure(error, &lists[0]))
+    }
+
     /// The lists of the contents `bytes`.
     fn lists<'a>(&'a self, bytes: &'a [Vec<u8>], known: &Known) -> Result<Vec<List<'a>>, Failure> {
         let lists = &self.observations;

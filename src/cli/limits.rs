@@ -4,18 +4,13 @@ use super::output::{Output, fitted, remarks, scene};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::config::Config;
-use crate::data::scene::Scene;
-use crate::model::for_blind_search;
-use crate::numerics::text::shown;
-use crate::planets::periodogram::{FrequencySettings, SearchSettings, Unbounded};
-use crate::runs::blind_search::BlindSearchOptions;
-use crate::runs::limits::{
-    self, BestOrbit, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Searches, Shortcut, WholeWay,
-};
-use crate::runs::pool::Brief;
-use crate::star::Orbit;
+use crate::numerics::text;
+use crate::planets::periodogram::{FrequencySettings, SearchSettings};
+use crate::runs::detection_limits::{DetectionLimits, LimitsError, LimitsOptions, LimitsProgress};
+use crate::runs::limits::{BestOrbit, CSV, JSON};
+use indicatif::{HumanDuration, ProgressBar};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What limits that are interrupted have not come to.
@@ -88,118 +83,82 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.spare(&scene.files(), |name| [CSV, JSON].contains(&name))?;
     remarks(&scene);
     let scene = fitted(global, scene);
-    let settings = settings(args, &scene)?;
-    let spinner = progress::bar(global, None, "planet-free map");
-    let shortcut =
-        Shortcut::new(&scene.imager, for_blind_search(scene.settings.values, &scene.settings.free), &settings);
-    spinner.finish_and_clear();
-    let shortcut = shortcut.map_err(|error| Failure::blind_search(&args.config, error.into()))?;
-    let orbits = orbits(args, &shortcut)?;
-    let meter = Meter::new(global, orbits.count());
-    let searches = shortcut.searches(orbits.k_kms.last().copied().unwrap_or_default());
-    let cells = limits::recovered(&searches, &orbits, &|done| meter.show(done));
-    meter.bar.finish_and_clear();
-    let rotation_period_d = scene.imager.star.rotation_period_d;
-    let found = limits::limits(&cells, rotation_period_d);
-    let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));
-    let comparisons = whole_way(global, &signals, &scene, (&shortcut, &searches), &drawn)?;
-    let file = LimitsFile::new(&shortcut, &orbits, found, comparisons, rotation_period_d, scene.provenance());
+    let pool = cluster::pool(global, &signals);
+    let shown = Shown::new(global);
+    let report = |progress| {
+        // from here on there is something to lose
+        if matches!(progress, LimitsProgress::Full { done: 0, .. }) {
+            signals.defer();
+        }
+        shown.show(progress);
+    };
+    let found = DetectionLimits::of(&scene, &options(args), &pool, &report);
+    shown.end();
+    let found = found.map_err(|error| match error {
+        LimitsError::Interrupted => signals.interrupted(before_the_first(LIMIT)),
+        error => Failure::limits(&args.config, error),
+    })?;
     let folder = args.output.create()?;
-    file.write(&cells, rotation_period_d, folder)?;
-    console::line(format_args!("{}written: {}: {CSV}, {JSON}", file.table(), shown(folder)));
+    found.write(folder)?;
+    console::line(format_args!("{}written: {}: {CSV}, {JSON}", found.table(), text::shown(folder)));
     Ok(())
 }
 
-/// The orbits both ways.
-fn whole_way(
-    global: &Global,
-    signals: &Signals,
-    scene: &Scene,
-    (shortcut, searches): (&Shortcut, &Searches),
-    orbits: &[Orbit],
-) -> Result<Vec<Comparison>, Failure> {
-    let pool = cluster::pool(global, signals);
-    if orbits.is_empty() {
-        return Ok(Vec::new());
-    }
-    let way = WholeWay::new(scene, shortcut);
-    let search = way.searcher(scene.clone());
-    let brief = Brief::Injections(Box::new(way)).to_bytes();
-    let meter = Meter::new(global, orbits.len());
-    signals.defer();
-    let mut comparisons = Vec::with_capacity(orbits.len());
-    for some in orbits.chunks(pool.size().max(1)) {
-        let found = pool.answers(&brief, some, &search);
-        if found.len() < some.len() {
-            meter.bar.finish_and_clear();
-            return Err(signals.interrupted(before_the_first(LIMIT)));
-        }
-        meter.show(some.len());
-        let both = |(orbit, full): (&Orbit, _)| Comparison { orbit: *orbit, shortcut: searches.of(orbit), full };
-        comparisons.extend(some.iter().zip(found).map(both));
-    }
-    meter.bar.finish_and_clear();
-    Ok(comparisons)
-}
-
-/// How orbits are looked for.
-fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
-    let Args { min_period_d, max_period_d, without_best, with_best, seed, .. } = *args;
-    let best = match (without_best, with_best) {
-        (true, _) => BestOrbit::Out,
-        (_, true) => BestOrbit::In,
-        _ => BestOrbit::OutIfCandidate,
-    };
-    let options = BlindSearchOptions {
-        periods: FrequencySettings { min_period_d, max_period_d, oversampling: None },
+/// The options as the library takes them.
+fn options(args: &Args) -> LimitsOptions {
+    let Args { min_period_d, max_period_d, without_best, with_best, .. } = *args;
+    LimitsOptions {
+        range: FrequencySettings { min_period_d, max_period_d, oversampling: None },
+        periods: args.periods.into(),
+        min_k_kms: args.min_k_kms,
+        max_k_kms: args.max_k_kms,
+        amplitudes: args.amplitudes.into(),
+        phases: args.phases.into(),
+        full: args.full.into(),
+        best: match (without_best, with_best) {
+            (true, _) => BestOrbit::Out,
+            (_, true) => BestOrbit::In,
+            _ => BestOrbit::OutIfCandidate,
+        },
         fixed: args.fixed,
         draws: args.draws as usize,
-        seed,
-        ..BlindSearchOptions::default()
-    };
-    let frequencies = options.frequencies(scene);
-    let frequencies = frequencies.map_err(|error| Failure::blind_search(&args.config, error.into()))?;
-    Ok(LimitSettings { detection: options.detection(scene), frequencies, best })
-}
-
-/// The injected orbits.
-fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
-    let unbounded = || Failure::failed(format!("{}: {Unbounded}", args.config.display()));
-    let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;
-    let (min, max) = (args.min_k_kms.unwrap_or(least), args.max_k_kms.unwrap_or(most));
-    if !(min > 0.0 && min < max && max.is_finite()) {
-        return Err(Failure::input(format!(
-            "--min-k-kms, --max-k-kms: {min} to {max} km/s is no range, both must be above 0, the first below the \
-            second"
-        )));
+        seed: args.seed,
     }
-    let (low, high) = shortcut.settings.frequencies.range();
-    Ok(Orbits {
-        porb_over_prot: limits::even_in_logarithm(1.0 / high, 1.0 / low, usize::from(args.periods)),
-        k_kms: limits::even_in_logarithm(min, max, usize::from(args.amplitudes)),
-        phases: usize::from(args.phases),
-    })
 }
 
-/// What is shown while orbits are tried.
-struct Meter {
-    bar: indicatif::ProgressBar,
-    began: Instant,
-    total: usize,
-    done: AtomicUsize,
+/// The bar of what is under way, one after the other.
+struct Shown<'a> {
+    global: &'a Global,
+    bar: Mutex<(ProgressBar, Instant)>,
 }
 
-impl Meter {
-    fn new(global: &Global, total: usize) -> Self {
-        let bar = progress::bar(global, Some(total as u64), "first orbits");
-        Meter { bar, began: Instant::now(), total, done: AtomicUsize::new(0) }
+impl<'a> Shown<'a> {
+    fn new(global: &'a Global) -> Self {
+        Shown { global, bar: Mutex::new((ProgressBar::hidden(), Instant::now())) }
     }
 
-    fn show(&self, orbits: usize) {
-        let done = self.done.fetch_add(orbits, Relaxed) + orbits;
-        let rate = done as f64 / self.began.elapsed().as_secs_f64().max(1e-9);
-        let left = Duration::from_secs_f64(self.total.saturating_sub(done) as f64 / rate);
-        self.bar.set_position(done as u64);
-        self.bar.set_message(format!("{done}/{} orbits, {:#} left", self.total, indicatif::HumanDuration(left)));
+    fn show(&self, progress: LimitsProgress) {
+        let mut bar = self.bar.lock().unwrap_or_else(PoisonError::into_inner);
+        let (done, total) = match progress {
+            LimitsProgress::Map => {
+                *bar = (progress::bar(self.global, None, "planet-free map"), Instant::now());
+                return;
+            }
+            LimitsProgress::Injections { done, total } | LimitsProgress::Full { done, total } => (done, total),
+        };
+        if done == 0 {
+            bar.0.finish_and_clear();
+            *bar = (progress::bar(self.global, Some(total as u64), "first orbits"), Instant::now());
+            return;
+        }
+        let (bar, began) = &*bar;
+        let rate = done as f64 / began.elapsed().as_secs_f64().max(1e-9);
+        let left = Duration::from_secs_f64(total.saturating_sub(done) as f64 / rate);
+        bar.set_position(done as u64);
+        bar.set_message(format!("{done}/{total} orbits, {:#} left", HumanDuration(left)));
+    }
+
+    fn end(self) {
+        self.bar.into_inner().unwrap_or_else(PoisonError::into_inner).0.finish_and_clear();
     }
 }

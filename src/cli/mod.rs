@@ -36,6 +36,7 @@ pub mod signals;
 mod simulate;
 
 pub use failure::Failure;
+pub use init::first_config;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};

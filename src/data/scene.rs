@@ -308,6 +308,19 @@ impl Scene {
         search::find(&self.imager, &self.space, self.search_settings(), report)
     }
 
+    /// The best parameters where those in `free` are free, as on the axes of a grid.
+    ///
+    /// # Errors
+    /// As [`Scene::optimise`].
+    #[doc(hidden)]
+    pub fn optimise_over(
+        &self,
+        free: &[FreeParameter],
+        report: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Found, SearchError> {
+        search::find(&self.imager, &self.space_of(free), self.search_settings(), report)
+    }
+
     /// The profiles in their whole width, as they are in their files: what is injected into.
     #[doc(hidden)]
     pub fn whole(&self) -> Observations {

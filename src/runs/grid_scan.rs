@@ -8,11 +8,15 @@ use crate::data::config::{GridSettings, MOST_NODES};
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::landscape;
 use crate::data::io::lines::{self, JournalError, LineFile};
+use crate::data::io::paraboloid::{self, ParaboloidFile};
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::runs::origin::{self, Origin, OriginError};
 use crate::runs::pool::{Asked, Brief, Pool, Task};
-use crate::sampling::landscape::{Grid, Landscape, LandscapeError, Node};
+use crate::sampling::landscape::{
+    Grid, Landscape, LandscapeError, Node, Paraboloid, Rule, Undefined, paraboloid as fit_paraboloid, paraboloid_table,
+    table,
+};
 use crate::surface::LIKELIHOOD_NUMBERS;
 use crate::surface::density::Density;
 use serde::{Deserialize, Serialize};
@@ -54,6 +58,12 @@ fn likelihood_numbers() -> Vec<String> {
 }
 
 impl Header {
+    /// What to bear in mind of the landscape.
+    pub fn notes(&self) -> Vec<String> {
+        let axes: Vec<String> = self.grid.names().map(str::to_owned).collect();
+        self.origin.reference.warnings(&axes)
+    }
+
     /// What it was begun with, and the names of its parameters.
     fn parts(&self) -> (&Origin, Vec<String>) {
         (&self.origin, self.grid.names().map(str::to_owned).collect())
@@ -109,6 +119,11 @@ pub enum GridScanError {
 }
 
 impl GridScan {
+    /// Whether `folder` holds nothing but a landscape that ended before its first node: another one may replace it.
+    pub fn is_false_start(folder: &Path) -> bool {
+        is_false_start(folder, true)
+    }
+
     /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes
     /// `found`. A landscape that is there already is replaced if `replace`, and refused otherwise.
     ///
@@ -169,6 +184,17 @@ impl GridScan {
         self.posterior.warm_starts().len()
     }
 
+    /// Fits the paraboloid of a whole landscape by `rule` and writes it into `folder`; the tables of both.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn conclude(&self, folder: &Path, rule: Rule) -> Result<String, WriteError> {
+        let truth = self.header.origin.truth.as_ref();
+        let found = fit_paraboloid(&self.landscape, rule);
+        ParaboloidFile::new(self.landscape.grid(), rule, truth, &found).write(&folder.join(PARABOLOID))?;
+        Ok(tables(&self.header, &self.landscape, &found))
+    }
+
     /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one,
     /// and of the last what was finished in time. Returns whether the landscape is whole.
     ///
@@ -193,6 +219,29 @@ impl GridScan {
         }
         Ok(true)
     }
+}
+
+/// What was printed of the landscape in `folder`, whole or not yet.
+///
+/// # Errors
+/// A folder without one, or files that are broken.
+pub fn printed(folder: &Path) -> Result<String, GridScanError> {
+    let header = Header::read(folder)?;
+    let landscape = landscape::read(&folder.join(NODES), header.grid.clone(), &header.numbers)?;
+    let text = match landscape.is_whole() {
+        true => tables(&header, &landscape, &fit_paraboloid(&landscape, paraboloid::rule(&folder.join(PARABOLOID)))),
+        false => {
+            let (done, all) = (landscape.nodes().len(), landscape.grid().len());
+            table(&landscape, header.origin.truth.as_ref()) + &format!("{done} of {all} nodes so far\n")
+        }
+    };
+    Ok(text + &header.notes().iter().map(|note| format!("note: {note}\n")).collect::<String>())
+}
+
+/// A landscape and its paraboloid as text.
+fn tables(header: &Header, landscape: &Landscape, found: &Result<Paraboloid, Undefined>) -> String {
+    let truth = header.origin.truth.as_ref();
+    table(landscape, truth) + &paraboloid_table(found, landscape.grid(), truth)
 }
 
 /// The first axis that is not the same.

@@ -5,8 +5,9 @@
 //! 1. [`pool`] spreads evaluations over threads, or over the ranks of a `cluster`.
 //! 2. [`origin`] and [`manifest`] are what a folder was begun with.
 //! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`maps`] the star there,
-//!    [`simulated`] what it was made with; [`blind_search`] and [`limits`] are searches for orbits, [`plan`] what
-//!    profiles not yet taken would show. [`log_posterior`] is the density of a chain for other samplers.
+//!    [`simulated`] what it was made with; [`blind_search`] and [`limits`] are searches for orbits,
+//!    [`detection_limits`] carries out the latter, [`injected`] puts an orbit into profiles, [`plan`] is what profiles
+//!    not yet taken would show. [`log_posterior`] is the density of a chain for other samplers.
 //! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] compares a chain with a
 //!    landscape.
 //! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
@@ -17,8 +18,10 @@ pub mod blind_search;
 #[cfg(feature = "mpi")]
 pub mod cluster;
 pub mod comparison;
+pub mod detection_limits;
 pub mod export;
 pub mod grid_scan;
+pub mod injected;
 pub mod limits;
 pub mod log_posterior;
 pub mod manifest;

@@ -38,8 +38,10 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "limits",
             "maps",
             "simulated",
+            "injected",
             "plan",
             "pool",
+            "detection_limits",
             "manifest",
             "grid_scan",
             "optimum",
@@ -55,7 +57,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     // from saved files alone: nothing that makes images, samples or searches
     (
         "figures",
-        &["drawing", "plot", "report"],
+        &["drawing", "plot", "printed", "report"],
         &[
             "numerics::text",
             "numerics::quantile",

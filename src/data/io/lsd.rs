@@ -76,7 +76,16 @@ pub fn read(list: &Path) -> Result<ProfileSet, LsdError> {
     read_around(list, None)
 }
 
-/// The same where the velocities between two (km/s, after VRAD) are used: bad bins outside do no harm.
+/// The profiles that a list names, each in its whole width.
+///
+/// # Errors
+/// A file that cannot be read, a line that makes no sense, a list of one profile, or profiles on different velocity
+/// axes.
+pub fn read_observations(list: &Path) -> Result<Observations, LsdError> {
+    Ok(read(list)?.observations)
+}
+
+/// As [`read`], where the velocities between two (km/s, after VRAD) are used: bad bins outside do no harm.
 ///
 /// # Errors
 /// As [`read`].

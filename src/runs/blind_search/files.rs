@@ -54,9 +54,7 @@ impl BlindSearch<'_> {
 
     /// The table of what was found, and what the config leaves to the observations.
     pub fn table(&self) -> String {
-        let measured = self.measured().lines();
-        let measured: String = measured.iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
-        PeriodogramFile::of(self).table(self.scene.imager.star.rotation_period_d) + &measured
+        PeriodogramFile::of(self).printed()
     }
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.

@@ -16,8 +16,16 @@ use crate::surface::ConstantVelocity;
 const SHOWN: usize = 6;
 
 impl PeriodogramFile {
+    /// What is printed of the search: the table, and what the config leaves to the observations.
+    pub fn printed(&self) -> String {
+        let OrbitRecord { period_d, porb_over_prot, .. } = self.best;
+        let measured = self.provenance.measured.lines();
+        let measured: String = measured.iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
+        self.table(period_d / porb_over_prot) + &measured
+    }
+
     /// The text, a line or a table after the other.
-    pub(super) fn table(&self, rotation_period_d: f64) -> String {
+    fn table(&self, rotation_period_d: f64) -> String {
         let best = std::slice::from_ref(&self.best);
         let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(best, rotation_period_d);
         text += &meanings(&self.best.quantities);
