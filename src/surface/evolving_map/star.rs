@@ -1,10 +1,9 @@
 //! What the profiles say of the star itself: the numbers of its line and of active regions for which ln Z is largest,
 //! together with the field, which they change (`docs/method.md` section 9).
 //!
-//! ln Z is climbed by Newton's steps. Its gradient is one of differences, as the determinant counts. From step to step
-//! the part of the determinant stays nearly as it is: there only that of the linearised model is found anew, until the
-//! climb ends by it, where differences have the last word. Second derivatives are those of the linearised model,
-//! improved from step to step. Harmonics up to a low degree do: they say the same of lines.
+//! ln Z is climbed by Newton's steps. Its gradient is one of differences, as the determinant counts; its second
+//! derivatives are those of the linearised model, improved from step to step. Harmonics up to a low degree do: they say
+//! the same of lines.
 
 use super::climb::{LEAST_BEND, USUAL_BEND, assumed_at, limits as limits_of_field, place as place_of_field};
 use super::fit::{fit, share_of};
@@ -321,34 +320,33 @@ impl<'a> Climb<'a> {
         i >= OF_FIELD || self.free[i]
     }
 
-    /// Of the linearised model at fixed maps, and of the priors: minus the second derivatives, and the gradient along
-    /// the star's numbers, to which the determinant adds its part.
-    fn linearised(&self, at: &Point) -> Result<(DMatrix<f64>, DVector<f64>), FieldError> {
+    /// Minus the second derivatives: those of the linearised model at fixed maps, and of the priors.
+    fn bend(&self, at: &Point) -> Result<DMatrix<f64>, FieldError> {
         let parameters: Vec<Parameter> = self.priors.iter().map(|prior| prior.parameter).collect();
         let imager = &Imager { mean_profile: at.place[SIZE].exp(), ..self.imager.clone() };
         let expansion = at.marginal.expansion(imager, &self.basis, &parameters)?;
         let profiles = expansion.profiles();
         let of_star = expansion.information.view((profiles, profiles), (parameters.len(), parameters.len()));
         let mut of_star = of_star.into_owned();
-        let mut pull = expansion.gradient.rows(profiles, parameters.len()).into_owned();
-        let numbers = self.numbers(&at.place, &at.marginal.values);
-        for (i, (prior, x)) in self.priors.iter().zip(numbers).enumerate() {
-            of_star[(i, i)] += prior.sd.powi(-2);
-            pull[i] -= (x - prior.mean) / prior.sd.powi(2);
-        }
+        self.priors.iter().enumerate().for_each(|(i, prior)| of_star[(i, i)] += prior.sd.powi(-2));
         let jacobian = self.jacobian(at);
-        let pull = jacobian.tr_mul(&pull);
         let of_star = jacobian.tr_mul(&of_star) * jacobian;
         let mut bend = DMatrix::zeros(self.limits.len(), self.limits.len());
         bend.view_mut((OF_FIELD, OF_FIELD), of_star.shape()).copy_from(&of_star);
         (0..OF_FIELD).for_each(|i| bend[(i, i)] = USUAL_BEND);
-        Ok((bend, pull))
+        Ok(bend)
     }
 
-    /// The gradient along the first so many numbers, those of the field before all others, by differences over steps
-    /// that change the height by some half: central ones, which give minus the second derivatives along each number,
-    /// too, or one-sided ones where these are known well.
-    fn gradient(&self, at: &Point, bend: &DMatrix<f64>, count: usize, central: bool) -> (DVector<f64>, DVector<f64>) {
+    /// The same, with those along each number of the field.
+    fn with_field(&self, at: &Point, of_field: &[f64; OF_FIELD]) -> Result<DMatrix<f64>, FieldError> {
+        let mut bend = self.bend(at)?;
+        of_field.iter().enumerate().for_each(|(i, along)| bend[(i, i)] = *along);
+        Ok(bend)
+    }
+
+    /// The gradient, by differences over steps that change the height by some half: central ones, which give minus the
+    /// second derivatives along each number, too, or one-sided ones where these are known well.
+    fn gradient(&self, at: &Point, bend: &DMatrix<f64>, central: bool) -> (DVector<f64>, DVector<f64>) {
         let along = |i: usize| {
             if !self.is_free(i) {
                 return (0.0, bend[(i, i)]);
@@ -375,7 +373,7 @@ impl<'a> Climb<'a> {
                 (None, None) => (0.0, bend[(i, i)]),
             }
         };
-        let all: Vec<(f64, f64)> = (0..count).into_par_iter().map(along).collect();
+        let all: Vec<(f64, f64)> = (0..self.limits.len()).into_par_iter().map(along).collect();
         let of = |which: &dyn Fn(&(f64, f64)) -> f64| DVector::from_iterator(all.len(), all.iter().map(which));
         (of(&|a| a.0), of(&|a| a.1))
     }
@@ -384,22 +382,13 @@ impl<'a> Climb<'a> {
     /// Second derivatives along the numbers of the field are measured, unless they are known.
     fn up(&self, mut here: Point, of_field: Option<[f64; OF_FIELD]>) -> Result<Top, FieldError> {
         let count = self.limits.len();
-        let with_field = |mut bend: DMatrix<f64>, of_field: &[f64; OF_FIELD]| {
-            of_field.iter().enumerate().for_each(|(i, along)| bend[(i, i)] = *along);
-            bend
-        };
-        let (of_star, mut pull) = self.linearised(&here)?;
-        let first = with_field(of_star.clone(), &of_field.unwrap_or([USUAL_BEND; OF_FIELD]));
-        let (mut gradient, along) = self.gradient(&here, &first, count, of_field.is_none());
+        let mut bend = self.with_field(&here, &of_field.unwrap_or([USUAL_BEND; OF_FIELD]))?;
+        let (mut gradient, along) = self.gradient(&here, &bend, of_field.is_none());
         let steps = if of_field.is_some() { LAST_STEPS } else { STEPS };
         let of_field = of_field.unwrap_or(std::array::from_fn(|i| along[i].max(LEAST_BEND)));
         let mut damping = DAMPING;
-        let mut bend = with_field(of_star, &of_field);
+        bend = self.with_field(&here, &of_field)?;
         let mut learnt = false;
-        // what the determinant adds to the gradient along the star's numbers, and whether that is of here
-        let stars = (OF_FIELD, count - OF_FIELD);
-        let mut of_determinant = gradient.rows(stars.0, stars.1) - &pull;
-        let mut is_of_here = true;
         for step in 1..=steps {
             let pushes = |i: usize| {
                 let (low, high) = self.limits[i];
@@ -425,19 +414,13 @@ impl<'a> Climb<'a> {
             let Some(hoped) = way(damping).map(|way| 0.5 * inside.dot(&way)) else {
                 // what was learnt on the way does not go with the star's part
                 match learnt {
-                    true => (bend, learnt) = (with_field(self.linearised(&here)?.0, &of_field), false),
+                    true => (bend, learnt) = (self.with_field(&here, &of_field)?, false),
                     false => break,
                 }
                 continue;
             };
             if hoped < GAIN {
-                if is_of_here {
-                    break;
-                }
-                gradient = self.gradient(&here, &bend, count, false).0;
-                of_determinant = gradient.rows(stars.0, stars.1) - &pull;
-                is_of_here = true;
-                continue;
+                break;
             }
             let mut next = None;
             while next.is_none() && damping < MOST_DAMPING {
@@ -448,22 +431,18 @@ impl<'a> Climb<'a> {
             let (gained, moved) = (next.height - here.height, &next.place - &here.place);
             let moved = moved.map_with_location(|i, _, x| if self.is_free(i) { x } else { 0.0 });
             here = next;
-            if gained < 0.3 * GAIN && is_of_here {
+            if gained < 0.3 * GAIN {
                 break;
             }
             // the star's part anew; what is left is learnt on the way (BFGS; chapter 6 there)
-            let of_star;
-            (of_star, pull) = self.linearised(&here)?;
+            let of_star = self.bend(&here)?;
             let corner = (OF_FIELD, OF_FIELD);
             let size = (count - OF_FIELD, count - OF_FIELD);
             bend.view_mut(corner, size).copy_from(&of_star.view(corner, size));
             if step == steps {
                 break;
             }
-            is_of_here = false;
-            let of_numbers = self.gradient(&here, &bend, OF_FIELD, false).0;
-            let of_star = &pull + &of_determinant;
-            let there = DVector::from_iterator(count, of_numbers.iter().chain(of_star.iter()).copied());
+            let there = self.gradient(&here, &bend, false).0;
             let (bent, before) = (&gradient - &there, &bend * &moved);
             if moved.dot(&bent) > 0.1 * moved.dot(&before) {
                 bend += &bent * bent.transpose() / moved.dot(&bent) - &before * before.transpose() / moved.dot(&before);
