@@ -9,7 +9,7 @@ use super::{
     AtTarget, Change, Explained, Linearised, NoFit, NoMaps, OtherRotation, SurfaceError, SurfaceMaps, WithoutJitter,
 };
 use crate::model::{ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -68,6 +68,15 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// # Errors
     /// [`SurfaceError`].
     fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError>;
+
+    /// The star as it is `here` with fields of spots that absorb less and more of an orbit, in even steps along a line,
+    /// where spots are a field; none otherwise.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    fn absorbing(&self, _at: At, _here: &Linearised) -> Result<Vec<OfField>, SurfaceError> {
+        Ok(Vec::new())
+    }
 
     /// The same model with what was fitted of the spots held.
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel>;

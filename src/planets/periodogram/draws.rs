@@ -61,27 +61,24 @@ fn highest(rows: &DMatrix<f64>, deviates: &DMatrix<f64>) -> Vec<f64> {
 
 /// `L^-1 X' S` of all periods, two rows each, S S' being the covariance of the gradient.
 fn whitened(level: &Level, frequencies: &[f64]) -> DMatrix<f64> {
-    let mut bounded = scan(&level.quadratic, frequencies);
-    bounded.retain(|trial| trial.orbit.is_some());
-    whitening(&level.quadratic.cycles, &bounded, &level.root).0.transpose()
-}
-
-/// `S X L^-T` of all trials, two columns each, S being symmetric; and the three elements of each L.
-pub(super) fn whitening(cycles: &[f64], trials: &[Trial], s: &DMatrix<f64>) -> (DMatrix<f64>, Vec<[f64; 3]>) {
-    let frequencies: Vec<f64> = trials.iter().map(|t| t.frequency).collect();
-    let mut columns = s * design(cycles, &frequencies);
-    let mut factors = Vec::with_capacity(trials.len());
-    for (j, trial) in trials.iter().enumerate() {
-        let Some(factor) = trial.information.cholesky().map(|c| c.l()) else {
-            factors.push([f64::INFINITY; 3]);
-            continue;
-        };
+    let trials = scan(&level.quadratic, frequencies);
+    let bounded: Vec<(f64, [f64; 3])> =
+        trials.iter().filter_map(|trial| Some((trial.frequency, factor(trial)?))).collect();
+    let frequencies: Vec<f64> = bounded.iter().map(|trial| trial.0).collect();
+    let mut columns = &level.root * design(&level.quadratic.cycles, &frequencies);
+    for (j, (_, [a, below, b])) in bounded.into_iter().enumerate() {
         for i in 0..columns.nrows() {
-            let first = columns[(i, 2 * j)] / factor[(0, 0)];
-            let second = (columns[(i, 2 * j + 1)] - factor[(1, 0)] * first) / factor[(1, 1)];
+            let first = columns[(i, 2 * j)] / a;
+            let second = (columns[(i, 2 * j + 1)] - below * first) / b;
             (columns[(i, 2 * j)], columns[(i, 2 * j + 1)]) = (first, second);
         }
-        factors.push([factor[(0, 0)], factor[(1, 0)], factor[(1, 1)]]);
     }
-    (columns, factors)
+    columns.transpose()
+}
+
+/// The elements of L, `A = L L'` being the information of a trial; `None` where no orbit is bounded.
+pub(super) fn factor(trial: &Trial) -> Option<[f64; 3]> {
+    trial.orbit?;
+    let factor = trial.information.cholesky()?.l();
+    Some([factor[(0, 0)], factor[(1, 0)], factor[(1, 1)]])
 }

@@ -1,17 +1,19 @@
-//! Orbits put into the velocities of a star, and the highest peak of each, beside a jitter of unknown size.
+//! Orbits put into the velocities of a star, and the highest peak of each, beside a jitter of unknown size and
+//! spots of an unknown field.
 //!
 //! An orbit adds `I V` to the gradient and changes nothing else, so that the whitened gradient at every trial period
 //! and for every size of the jitter is linear in the orbit's two amplitudes: three products a period, and each orbit
 //! of that period is a sum. A jitter that hides an orbit grows with it, so sizes reach from none to that of the largest
-//! orbit.
+//! orbit. Spots that hide an orbit are of another field, shorter-lived: a search takes the field that suits the star
+//! best with the orbit in its velocities and no planet in the model, which lies between the fields that are given.
 
-use super::draws::whitening;
+use super::draws::factor;
 use super::false_alarm::FalseAlarm;
 use super::jitter::{Jitters, ln_prior};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use std::sync::OnceLock;
 
 /// Sizes of the jitter grow by this factor.
@@ -20,27 +22,54 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 /// The smallest one, of the standard error of a velocity.
 const SMALLEST: f64 = 0.35;
 
-/// Draws by which the level of detections beside a jitter is found; beyond their reach by the form of the tail.
+/// Draws by which the level of detections beside a fitted jitter is found, one for each size of it; beyond their reach
+/// by the form of the tail.
 const DRAWS: usize = 1000;
 
-/// The velocities of a star without a planet, into which orbits are put.
+/// A star without a planet, with one field of spots.
+#[derive(Clone, Debug)]
+pub struct OfField {
+    /// The velocities that are searched; without a jitter where that is fitted.
+    pub velocities: VelocityQuadratic,
+    /// Those by which the field is fitted: with all constant velocities held.
+    pub held: VelocityQuadratic,
+    /// What its fit maximises: ln L at velocities 0, the prior of the field counted.
+    pub ln_posterior: f64,
+}
+
+/// What is known of the jitter.
+#[derive(Clone, Copy, Debug)]
+pub enum Jitter {
+    /// All: it is among the noise.
+    Known,
+    /// It is fitted, its prior of that scale (km/s).
+    Fitted(Option<f64>),
+}
+
+/// A star without a planet, into which orbits are put.
 pub struct Injections<'a> {
-    without: &'a VelocityQuadratic,
-    scale_kms: Option<f64>,
+    fields: Vec<Field<'a>>,
     frequencies: &'a Frequencies,
     settings: SearchSettings,
     probability: f64,
+    /// cos and sin of all trial periods.
+    trials: DMatrix<f64>,
+}
+
+/// One field, with jitters of all sizes.
+struct Field<'a> {
+    star: &'a OfField,
+    scale_kms: Option<f64>,
     sizes: Vec<Size>,
 }
 
 /// A jitter of one size.
 struct Size {
     kms: f64,
-    /// Trial periods that are bounded.
-    frequencies: Vec<f64>,
-    /// From the gradient without a jitter to the two whitened amplitudes of every trial period.
-    rows: DMatrix<f64>,
-    /// From these to (a, b): lower factors of the information.
+    /// From the gradient without a jitter to that beside it.
+    left: DMatrix<f64>,
+    /// From the gradient in (a, b) at every trial period to whitened amplitudes: lower factors of the information;
+    /// infinite where no orbit is bounded.
     factors: Vec<[f64; 3]>,
     /// ln L at velocities 0: a constant, and directions of the gradient whose squares add to it.
     constant: f64,
@@ -54,6 +83,14 @@ pub struct Column<'a, 'b> {
     all: &'b Injections<'a>,
     cycles: &'a [f64],
     frequency: f64,
+    fields: Vec<OfPeriod>,
+}
+
+/// What orbits of one period change, with one field.
+struct OfPeriod {
+    /// ln L without a planet and without a jitter, in (a, b).
+    gradient: Vector2<f64>,
+    information: Matrix2<f64>,
     /// Of each size: whitened amplitudes, and those along the directions, of no orbit and of a and b of 1 km/s.
     whitened: Vec<[DVector<f64>; 3]>,
     along: Vec<[DVector<f64>; 3]>,
@@ -73,54 +110,80 @@ pub struct Highest {
 }
 
 impl<'a> Injections<'a> {
-    /// Into velocities `without` jitter, whose prior has that scale, orbits of up to `most_kms`; a detection has
+    /// Into a star with one of these `fields`, in even steps along a line; orbits of up to `most_kms`. A detection has
     /// that false-alarm `probability`.
     pub fn new(
-        (without, scale_kms): (&'a VelocityQuadratic, Option<f64>),
+        fields: &'a [OfField],
+        jitter: Jitter,
         most_kms: f64,
         frequencies: &'a Frequencies,
         settings: SearchSettings,
         probability: f64,
     ) -> Self {
-        let eigen = without.information.clone().symmetric_eigen();
-        let lambda = eigen.eigenvalues.map(|l| l.max(0.0));
-        let error_kms = (lambda.len() as f64 / lambda.sum()).sqrt();
-        let mut kms = vec![0.0];
-        let mut next = SMALLEST * error_kms;
-        while next < STEP * most_kms.max(error_kms) {
-            kms.push(next);
-            next *= STEP;
-        }
-        let size = |kms: f64| Size::new((kms, scale_kms), without, (&lambda, &eigen.eigenvectors), frequencies);
-        let sizes = kms.into_iter().map(size).collect();
-        let settings = SearchSettings { draws: DRAWS.min(settings.draws), ..settings };
-        Injections { without, scale_kms, frequencies, settings, probability, sizes }
+        let trials = design(&fields[0].velocities.cycles, &frequencies.per_cycle);
+        let fields = fields.iter().map(|star| Field::new(star, jitter, most_kms, frequencies)).collect();
+        let settings = match jitter {
+            Jitter::Known => settings,
+            Jitter::Fitted(_) => SearchSettings { draws: DRAWS.min(settings.draws), ..settings },
+        };
+        Injections { fields, frequencies, settings, probability, trials }
     }
 
     /// Orbits of that period over the rotation period.
     pub fn column(&self, porb_over_prot: f64) -> Column<'a, '_> {
         let frequency = 1.0 / porb_over_prot;
-        let cycles: &[f64] = &self.without.cycles;
-        let moved = &self.without.information * design(cycles, &[frequency]);
-        let parts = [self.without.gradient.clone(), moved.column(0).into_owned(), moved.column(1).into_owned()];
-        let by = |matrix: &DMatrix<f64>| parts.each_ref().map(|part| matrix * part);
-        let (mut whitened, mut along) = (Vec::new(), Vec::new());
-        for size in &self.sizes {
-            whitened.push(by(&size.rows));
-            along.push(by(&size.directions));
-        }
-        Column { all: self, cycles, frequency, whitened, along }
+        let cycles: &[f64] = &self.fields[0].star.velocities.cycles;
+        let orbits = design(cycles, &[frequency]);
+        let fields = self.fields.iter().map(|field| field.of_period(&orbits, &self.trials)).collect();
+        Column { all: self, cycles, frequency, fields }
     }
 
-    fn level(&self, size: &Size) -> f64 {
+    fn level(&self, field: &Field, size: &Size) -> f64 {
         *size.level.get_or_init(|| {
+            let velocities = &field.star.velocities;
             let jitters = match size.kms > 0.0 {
-                true => Jitters::new(self.without, size.kms, self.scale_kms),
-                false => Jitters::none(self.without),
+                true => Jitters::new(velocities, size.kms, field.scale_kms),
+                false => Jitters::none(velocities),
             };
             let SearchSettings { draws, seed } = self.settings;
             FalseAlarm::draw(&jitters, &self.frequencies.per_cycle, draws, seed).level(self.probability)
         })
+    }
+}
+
+impl<'a> Field<'a> {
+    fn new(star: &'a OfField, jitter: Jitter, most_kms: f64, frequencies: &Frequencies) -> Self {
+        let eigen = star.velocities.information.clone().symmetric_eigen();
+        let lambda = eigen.eigenvalues.map(|l| l.max(0.0));
+        let error_kms = (lambda.len() as f64 / lambda.sum()).sqrt();
+        let (mut kms, mut scale_kms) = (vec![0.0], None);
+        if let Jitter::Fitted(scale) = jitter {
+            scale_kms = scale;
+            let mut next = SMALLEST * error_kms;
+            while next < STEP * most_kms.max(error_kms) {
+                kms.push(next);
+                next *= STEP;
+            }
+        }
+        let size =
+            |kms: f64| Size::new((kms, scale_kms), &star.velocities, (&lambda, &eigen.eigenvectors), frequencies);
+        Field { star, scale_kms, sizes: kms.into_iter().map(size).collect() }
+    }
+
+    /// With `orbits` of 1 km/s, cos and sin of one period.
+    fn of_period(&self, orbits: &DMatrix<f64>, trials: &DMatrix<f64>) -> OfPeriod {
+        let OfField { velocities, held, .. } = self.star;
+        let moved = &velocities.information * orbits;
+        let parts = [velocities.gradient.clone(), moved.column(0).into_owned(), moved.column(1).into_owned()];
+        let whitened = |size: &Size| parts.each_ref().map(|part| size.whitened(trials.tr_mul(&(&size.left * part))));
+        let along = |size: &Size| parts.each_ref().map(|part| &size.directions * part);
+        let (b, a) = (orbits.tr_mul(&held.gradient), orbits.tr_mul(&(&held.information * orbits)));
+        OfPeriod {
+            gradient: Vector2::new(b[0], b[1]),
+            information: Matrix2::from_fn(|i, j| a[(i, j)]),
+            whitened: self.sizes.iter().map(whitened).collect(),
+            along: self.sizes.iter().map(along).collect(),
+        }
     }
 }
 
@@ -139,19 +202,50 @@ impl Size {
             gradient: DVector::zeros(lambda.len()),
             information: 0.5 * (&information + information.transpose()),
         };
-        let mut trials = scan(&beside, &all.per_cycle);
-        trials.retain(|trial| trial.orbit.is_some());
-        let (columns, factors) = whitening(&beside.cycles, &trials, &among(&left));
+        let trials = scan(&beside, &all.per_cycle);
         Size {
             kms,
-            frequencies: trials.iter().map(|trial| trial.frequency).collect(),
-            rows: columns.transpose(),
-            factors,
+            left: among(&left),
+            factors: trials.iter().map(|trial| factor(trial).unwrap_or(UNBOUNDED)).collect(),
             constant: 0.5 * left.map(f64::ln).sum() + ln_prior(kms, scale_kms),
             directions: DMatrix::from_diagonal(&left.map(|left| kms * (0.5 * left).sqrt())) * u.transpose(),
             level: OnceLock::new(),
         }
     }
+
+    /// Whitened amplitudes from the gradient in (a, b) at every trial period.
+    fn whitened(&self, mut gradient: DVector<f64>) -> DVector<f64> {
+        for (trial, [first, below, second]) in self.factors.iter().enumerate() {
+            let a = gradient[2 * trial] / first;
+            gradient[2 * trial] = a;
+            gradient[2 * trial + 1] = (gradient[2 * trial + 1] - below * a) / second;
+        }
+        gradient
+    }
+}
+
+/// Factors by which whitened amplitudes are 0.
+const UNBOUNDED: [f64; 3] = [f64::INFINITY, 0.0, f64::INFINITY];
+
+/// Numbers of the orbit (a, b) from those of no orbit and of a and b of 1 km/s.
+fn sum(parts: &[DVector<f64>; 3], ab: Vector2<f64>) -> DVector<f64> {
+    &parts[0] + &parts[1] * ab.x + &parts[2] * ab.y
+}
+
+/// Number of the largest value.
+fn largest(values: &[f64]) -> Option<usize> {
+    (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))
+}
+
+/// Number of the maximum uphill from one of the values.
+fn uphill(values: &[f64], mut at: usize) -> usize {
+    while at + 1 < values.len() && values[at + 1] > values[at] {
+        at += 1;
+    }
+    while at > 0 && values[at - 1] > values[at] {
+        at -= 1;
+    }
+    at
 }
 
 impl Column<'_, '_> {
@@ -159,32 +253,83 @@ impl Column<'_, '_> {
     /// is bounded.
     pub fn highest(&self, k_kms: f64, phi: f64) -> Option<Highest> {
         let ab = amplitudes(self.cycles, self.frequency, k_kms, phi);
-        let sum = |parts: &[DVector<f64>; 3]| &parts[0] + &parts[1] * ab.x + &parts[2] * ab.y;
-        let alone: Vec<f64> =
-            self.all.sizes.iter().zip(&self.along).map(|(s, a)| s.constant + sum(a).norm_squared()).collect();
-        let best_alone = (0..alone.len()).max_by(|a, b| alone[*a].total_cmp(&alone[*b]))?;
-        let whitened: Vec<DVector<f64>> = self.whitened.iter().map(sum).collect();
+        let posteriors = self.ln_posteriors(ab);
+        // as a fit, which climbs from the field without the orbit: another maximum may be higher
+        let best = uphill(&posteriors, largest(&self.ln_posteriors(Vector2::zeros()))?);
+        let here = self.highest_in(best, ab)?;
+        if best == 0 || best + 1 == posteriors.len() {
+            return Some(here);
+        }
+        let beyond = vertex([0, 1, 2].map(|k| posteriors[best + k - 1]));
+        let next = self.highest_in(if beyond > 0.0 { best + 1 } else { best - 1 }, ab)?;
+        Some(here.towards(next, beyond.abs()))
+    }
+
+    /// What fits without a planet maximise, of each field, where (a, b) is in the velocities.
+    fn ln_posteriors(&self, ab: Vector2<f64>) -> Vec<f64> {
+        self.all.fields.iter().zip(&self.fields).map(|(field, of)| field.ln_posterior(of, ab)).collect()
+    }
+
+    /// The highest peak with one of the fields, the orbit (a, b) being in the velocities.
+    fn highest_in(&self, field: usize, ab: Vector2<f64>) -> Option<Highest> {
+        let (of, field) = (&self.fields[field], &self.all.fields[field]);
+        let alone = field.alone(of, ab);
+        let best_alone = largest(&alone)?;
+        let whitened: Vec<DVector<f64>> = of.whitened.iter().map(|parts| sum(parts, ab)).collect();
         let height = |size: usize, trial: usize| {
             let amplitudes = whitened[size].as_slice();
             0.5 * (amplitudes[2 * trial].powi(2) + amplitudes[2 * trial + 1].powi(2))
         };
-        let all = (0..alone.len()).flat_map(|size| (0..self.all.sizes[size].frequencies.len()).map(move |t| (size, t)));
-        let of = |&(size, trial): &(usize, usize)| alone[size] + height(size, trial);
-        let best @ (size, trial) = all.max_by(|a, b| of(a).total_cmp(&of(b)))?;
-        let Size { frequencies, factors, .. } = &self.all.sizes[size];
+        let bounded = |size: usize, trial: usize| field.sizes[size].factors[trial] != UNBOUNDED;
+        let frequencies = &self.all.frequencies.per_cycle;
+        let of_size = |size: usize| (0..frequencies.len()).map(move |trial| (size, trial));
+        let all = (0..alone.len()).flat_map(of_size).filter(|&(size, trial)| bounded(size, trial));
+        let total = |&(size, trial): &(usize, usize)| alone[size] + height(size, trial);
+        let best @ (size, trial) = all.max_by(|a, b| total(a).total_cmp(&total(b)))?;
         let [a, b] = [whitened[size][2 * trial], whitened[size][2 * trial + 1]];
-        let [first, below, second] = factors[trial];
+        let [first, below, second] = field.sizes[size].factors[trial];
         // (a, b) = L^-T of the whitened amplitudes
         let y = b / second;
         let x = (a - below * y) / first;
-        let heights = |k: usize| height(size, k);
         Some(Highest {
-            frequency: summit(frequencies, trial, heights),
-            delta_ln_l: of(&best) - alone[best_alone],
+            frequency: summit(frequencies, trial, |k| height(size, k)),
+            delta_ln_l: total(&best) - alone[best_alone],
             k_kms: x.hypot(y),
-            level: self.all.level(&self.all.sizes[best_alone]),
+            level: self.all.level(field, &field.sizes[best_alone]),
         })
     }
+}
+
+impl Field<'_> {
+    /// ln L without a planet and beside each jitter, above that without one, where (a, b) is in the velocities.
+    fn alone(&self, of: &OfPeriod, ab: Vector2<f64>) -> Vec<f64> {
+        self.sizes.iter().zip(&of.along).map(|(size, along)| size.constant + sum(along, ab).norm_squared()).collect()
+    }
+
+    /// What a fit without a planet maximises, where (a, b) is in the velocities.
+    fn ln_posterior(&self, of: &OfPeriod, ab: Vector2<f64>) -> f64 {
+        let of_jitter = self.alone(of, ab).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        self.star.ln_posterior - of.gradient.dot(&ab) - 0.5 * ab.dot(&(of.information * ab)) + of_jitter
+    }
+}
+
+impl Highest {
+    /// Part of the way to the peak of a neighbouring field: heights change by a factor from one to the next.
+    fn towards(self, next: Highest, share: f64) -> Self {
+        let between = |a: f64, b: f64| a + share * (b - a);
+        Highest {
+            frequency: self.frequency,
+            delta_ln_l: self.delta_ln_l.powf(1.0 - share) * next.delta_ln_l.powf(share),
+            k_kms: between(self.k_kms, next.k_kms),
+            level: between(self.level, next.level),
+        }
+    }
+}
+
+/// Where the parabola through three even steps, the middle one the highest, is highest: steps from the middle.
+fn vertex([before, here, after]: [f64; 3]) -> f64 {
+    let bend = 2.0 * here - before - after;
+    if bend > 0.0 { (0.5 * (after - before) / bend).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
 /// Where the parabola through the peak at a trial and its neighbours is highest.
@@ -192,14 +337,8 @@ fn summit(frequencies: &[f64], trial: usize, height: impl Fn(usize) -> f64) -> f
     if trial == 0 || trial + 1 == frequencies.len() {
         return frequencies[trial];
     }
-    let [before, here, after] = [height(trial - 1), height(trial), height(trial + 1)];
-    let bend = 2.0 * here - before - after;
     let step = 0.5 * (frequencies[trial + 1] - frequencies[trial - 1]);
-    if bend > 0.0 {
-        frequencies[trial] + (0.5 * step * (after - before) / bend).clamp(-step.abs(), step.abs())
-    } else {
-        frequencies[trial]
-    }
+    frequencies[trial] + step * vertex([0, 1, 2].map(|k| height(trial + k - 1)))
 }
 
 #[cfg(test)]
@@ -209,6 +348,37 @@ mod tests {
     use super::super::sample::{self, uneven};
     use super::*;
 
+    /// Velocities whose information halves from field to field: an orbit is searched for with the field that suits the
+    /// star without a planet best, by its ln L and what the orbit costs, in both closed form.
+    #[test]
+    fn an_orbit_is_searched_for_with_the_field_that_absorbs_it() {
+        let cycles = uneven(20, 5.0);
+        let quadratic = |scatter_kms: f64| {
+            sample::independent(&cycles, &DVector::zeros(20), &DVector::from_element(20, scatter_kms))
+        };
+        let star = |(k, ln_posterior)| {
+            let velocities = quadratic(0.05 * 2f64.powf(0.5 * f64::from(k)));
+            OfField { held: velocities.clone(), velocities, ln_posterior }
+        };
+        let stars = [(0, 0.0), (1, -2.0), (2, -6.0), (3, -12.0)].map(star);
+        let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
+        let settings = SearchSettings { draws: 1000, seed: 1 };
+        let highest = |stars: &[OfField], k_kms: f64| {
+            let injections = Injections::new(stars, Jitter::Known, 0.6, &frequencies, settings, 0.01);
+            injections.column(1.7).highest(k_kms, 0.4).unwrap()
+        };
+        let of_field = |field: usize, k_kms: f64| highest(&stars[field..=field], k_kms);
+        // without a planet ln L falls by half of V I V: some 20 K^2 / 4 sigma^2
+        for (k_kms, between) in [(0.01, [0, 0]), (0.06, [0, 1]), (0.08, [1, 2]), (0.12, [2, 3]), (0.4, [3, 3])] {
+            let found = highest(&stars, k_kms);
+            let [most, least] = between.map(|field| of_field(field, k_kms).delta_ln_l);
+            assert!(
+                least * 0.999 <= found.delta_ln_l && found.delta_ln_l <= most * 1.001,
+                "{k_kms}: {found:?} {most} {least}"
+            );
+        }
+    }
+
     /// Against the search of velocities with the orbit in them, jitter by jitter.
     #[test]
     fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
@@ -217,14 +387,15 @@ mod tests {
         let without = sample::correlated(&cycles, &rv, 5);
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
         let settings = SearchSettings { draws: 1000, seed: 1 };
-        let injections = Injections::new((&without, None), 0.6, &frequencies, settings, 0.01);
+        let star = [OfField { velocities: without.clone(), held: without.clone(), ln_posterior: 0.0 }];
+        let injections = Injections::new(&star, Jitter::Fitted(None), 0.6, &frequencies, settings, 0.01);
         for (period, k_kms, phi) in [(1.7, 0.0, 0.0), (1.7, 0.3, 0.4), (0.61, 0.6, 0.9)] {
             let found = injections.column(period).highest(k_kms, phi).unwrap();
             let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
             let moved = &without.gradient + &without.information * velocities(&cycles, 1.0 / period, ab);
             let moved = VelocityQuadratic { gradient: moved, ..without.clone() };
             let (mut with, mut alone) = ((f64::NEG_INFINITY, 0.0, 0.0), f64::NEG_INFINITY);
-            for size in &injections.sizes {
+            for size in &injections.fields[0].sizes {
                 // ln L of this size above none, and the best orbit beside it
                 let [none, here] = match size.kms > 0.0 {
                     true => {

@@ -24,7 +24,7 @@ pub mod window;
 pub use eccentric::KeplerianOrbit;
 pub use false_alarm::FalseAlarm;
 pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
-pub use injections::Injections;
+pub use injections::{Injections, Jitter, OfField};
 pub use jitter::{Jitters, ln_prior};
 pub use orbits::{CircularOrbit, Trial};
 pub use peaks::Peak;

@@ -3,8 +3,8 @@
 //!
 //! An orbit is a shift of the profiles' velocities, in which ln L is known to second order: putting one in changes the
 //! gradient by the information times its velocities, and the search that follows costs milliseconds. What is counted as
-//! unresolved spots is found anew with every orbit, as `periodogram` would; the level of false alarms is that of the
-//! star without one. On a few of them the shortcut is held against the whole way: profiles resampled, imaged and
+//! unresolved spots is found anew with every orbit, as `periodogram` would, and so is the field of spots, among some
+//! that lie on a line. On a few orbits the shortcut is held against the whole way: profiles resampled, imaged and
 //! searched.
 
 mod cells;

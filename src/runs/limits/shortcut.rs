@@ -1,20 +1,22 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
 //!
-//! It is that of `periodogram`: the same nuisances, and the same jitter, which grows with an orbit that is not in the
-//! model. A planet that the profiles show as they are is taken out first, with the spots as they are beside it.
+//! It is that of `periodogram`: the same nuisances, and the same jitter and field of spots, which change with an orbit
+//! that is not in the model. A planet that the profiles show as they are is taken out first, with the spots as they are
+//! beside it.
 
 use crate::inference::detection::{Detection, DetectionSettings, jitters};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::injections::Highest;
 use crate::planets::periodogram::orbits::{Trial, scan};
 use crate::planets::periodogram::window::is_same_frequency;
-use crate::planets::periodogram::{CircularOrbit, Frequencies, Injections, Search, Unbounded};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Injections, Jitter, OfField, Search, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Linearised, SurfaceError, SurfaceModel, WithoutJitter};
+use crate::surface::{At, Linearised, SurfaceError, SurfaceModel};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 /// How orbits are looked for.
@@ -76,8 +78,10 @@ pub struct Shortcut<'a> {
     pub removed: Option<Orbit>,
     /// The star that orbits are put into.
     star: Linearised,
-    /// The same without its jitter.
-    without_jitter: Option<WithoutJitter>,
+    /// The same with fields of spots that absorb less and more of an orbit, where spots are a field.
+    fields: Vec<OfField>,
+    /// What is known of its jitter.
+    jitter: Jitter,
     /// The search of that star.
     pub before: Search,
     /// Delta ln L of a detection in it.
@@ -99,21 +103,19 @@ impl<'a> Shortcut<'a> {
             BestOrbit::In => false,
         };
         let mut star = found.planet_free.clone();
-        let mut without_jitter = found.without_jitter.clone();
+        let jitter = found.without_jitter.as_ref().map_or(Jitter::Known, |without| Jitter::Fitted(without.scale_kms));
         let (mut before, mut removed) = (found.blind.clone(), None);
+        let mut at = At { imager, values, nuisances: &detection.nuisances };
         if removes {
             let CircularOrbit { k_kms, phi, .. } = found.best.orbit;
             let porb_over_prot = found.best.porb_over_prot;
             let orbit = Orbit { k_kms: -k_kms, porb_over_prot, phi };
-            let mut beside = values;
-            beside.set(Parameter::K, k_kms);
-            beside.set(Parameter::PorbOverProt, porb_over_prot);
-            beside.set(Parameter::Phi, phi);
-            let at = At { imager, values: beside, nuisances: &detection.nuisances };
+            at.values.set(Parameter::K, k_kms);
+            at.values.set(Parameter::PorbOverProt, porb_over_prot);
+            at.values.set(Parameter::Phi, phi);
             // spots and jitter as they are beside the planet
-            let with_planet = found.last().clone();
-            without_jitter = surface.without_jitter(at, &with_planet)?;
-            star = with_planet;
+            star = found.last().clone();
+            let mut without_jitter = surface.without_jitter(at, &star)?;
             for here in std::iter::once(&mut star).chain(without_jitter.as_mut().map(|without| &mut without.here)) {
                 here.expansion = with(&here.expansion, &orbit);
                 here.quadratic = surface.velocities(&here.expansion, &detection.nuisances).ok_or(Unbounded)?;
@@ -121,8 +123,15 @@ impl<'a> Shortcut<'a> {
             before = Search::with_jitter(&jitters(&star, without_jitter.as_ref()), frequencies, detection.search)?;
             removed = Some(orbit);
         }
+        let mut fields = surface.absorbing(at, &star)?;
+        if let Some(orbit) = removed {
+            for OfField { velocities, held, .. } in &mut fields {
+                put_into(velocities, &orbit);
+                put_into(held, &orbit);
+            }
+        }
         let level = before.false_alarm.level(CANDIDATE_FAP);
-        Ok(Shortcut { settings, surface, found, removed, star, without_jitter, before, level })
+        Ok(Shortcut { settings, surface, found, removed, star, fields, jitter, before, level })
     }
 
     /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
@@ -140,9 +149,8 @@ impl<'a> Shortcut<'a> {
     /// The searches with orbits of up to `most_kms` in the profiles.
     pub fn searches(&self, most_kms: f64) -> Searches<'_> {
         let LimitSettings { detection, frequencies, .. } = self.settings;
-        let injections = self.without_jitter.as_ref().map(|without| {
-            let velocities = (&without.here.quadratic, without.scale_kms);
-            Injections::new(velocities, most_kms, frequencies, detection.search, CANDIDATE_FAP)
+        let injections = (!self.fields.is_empty()).then(|| {
+            Injections::new(&self.fields, self.jitter, most_kms, frequencies, detection.search, CANDIDATE_FAP)
         });
         Searches { shortcut: self, injections }
     }
@@ -151,7 +159,7 @@ impl<'a> Shortcut<'a> {
 /// Searches with an orbit in the profiles.
 pub struct Searches<'a> {
     shortcut: &'a Shortcut<'a>,
-    /// Where the profiles say how large the jitter is.
+    /// Where spots are a field.
     injections: Option<Injections<'a>>,
 }
 
@@ -164,7 +172,7 @@ impl Searches<'_> {
             let orbit = Orbit { k_kms, porb_over_prot, phi };
             let highest = match &column {
                 Some(column) => column.highest(k_kms, phi),
-                None => self.shortcut.beside_no_jitter(&orbit),
+                None => self.shortcut.without_a_field(&orbit),
             };
             let time_base_cycles = self.shortcut.settings.frequencies.time_base_cycles;
             highest.map_or_else(Outcome::default, |highest| Outcome::of(highest, &orbit, time_base_cycles))
@@ -178,9 +186,9 @@ impl Searches<'_> {
 }
 
 impl Shortcut<'_> {
-    /// The highest peak with `orbit` in the profiles, where the jitter is known; spots that the map does not resolve
-    /// may grow with the orbit.
-    fn beside_no_jitter(&self, orbit: &Orbit) -> Option<Highest> {
+    /// The highest peak with `orbit` in the profiles, where spots are no field; those that the map does not resolve may
+    /// grow with the orbit.
+    fn without_a_field(&self, orbit: &Orbit) -> Option<Highest> {
         let LimitSettings { detection, frequencies, .. } = self.settings;
         let moved = with(&self.star.expansion, orbit);
         let quadratic: VelocityQuadratic = self.surface.velocities(&moved, &detection.nuisances)?;
@@ -224,4 +232,10 @@ fn with(expansion: &Expansion, orbit: &Orbit) -> Expansion {
         moved.gradient.axpy(velocity, &expansion.information.column(k), 1.0);
     }
     moved
+}
+
+/// Puts `orbit` into the profiles that `quadratic` is of.
+fn put_into(quadratic: &mut VelocityQuadratic, orbit: &Orbit) {
+    let velocities = DVector::from_iterator(quadratic.len(), orbit.velocities_kms(&quadratic.cycles));
+    quadratic.gradient += &quadratic.information * velocities;
 }

@@ -13,7 +13,9 @@
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
 //! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 //! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
+//! 9. `absorbing`: fields that absorb more of an orbit that is not in the model, for detection limits.
 
+mod absorbing;
 mod basis;
 pub mod change;
 mod climb;

@@ -1,10 +1,10 @@
 //! The evolving map behind the interface of all surface models.
 
 use super::linearised::linearised;
-use super::{Basis, Change, Fitted, Known, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
+use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
 use crate::field::Lifetime;
 use crate::model::{ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -75,6 +75,20 @@ impl SurfaceModel for EvolvingMap {
         let without = linearised((at.imager, &basis), Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
         let here = Linearised { field: here.field.clone(), ..without };
         Ok(Some(WithoutJitter { here, found_kms, scale_kms }))
+    }
+
+    fn absorbing(&self, at: At, here: &Linearised) -> Result<Vec<OfField>, SurfaceError> {
+        let basis = Basis::new(&at.imager.grid);
+        let of_field = |marginal: &Marginal| {
+            let marginal = match self.known.jitter_kms {
+                None if marginal.assumed.jitter_kms > 0.0 => marginal.without_jitter(at.imager, &basis)?,
+                _ => marginal.clone(),
+            };
+            let ln_posterior = self.known.height(&marginal);
+            let here = linearised((at.imager, &basis), Fitted::near(marginal), at.nuisances)?;
+            Ok(OfField { velocities: here.quadratic, held: here.held, ln_posterior })
+        };
+        here.kept::<Fitted>().absorbing((at.imager, &basis), &self.known, of_field)
     }
 
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel> {
