@@ -56,7 +56,7 @@ pub struct Measured {
     /// `observations.events`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub events: Option<Events>,
-    /// `star.velocity_drift`: slopes of the velocities that the profiles show (km/s per day), with which they are imaged.
+    /// `star.velocity_drift`: slopes of the RVs that the profiles show (km/s per day), with which they are imaged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drift_kms_d: Vec<f64>,
     /// The field of spots that was fitted on the way to star and events, from which a fit with finer maps begins.
@@ -124,8 +124,8 @@ impl MeasuredSet {
     fn problem(&self) -> Option<String> {
         self.contrast.filter(FittedContrast::is_at_bound)?;
         Some(format!(
-            "spots of data set {} would have to be darker than black (contrast-at-bound): lower the contrast of the first \
-             data set, or list the data set with the darker spots first",
+            "spots of data set {} would have to be darker than black (contrast-at-bound): lower the contrast of the \
+             first data set, or list the data set with the darker spots first",
             self.name
         ))
     }
