@@ -15,8 +15,8 @@ const PRIOR: f64 = 0.7;
 /// Least and largest `1 - contrast`.
 const DARKNESS: (f64, f64) = (0.02, 1.0);
 
-/// A climb of ln(1 - contrast) begins with differences of this step, goes at most so far at once, and ends when it moves
-/// by less than a share of its error, or after so many steps.
+/// A climb of ln(1 - contrast) begins with differences of this step, goes at most so far at once, and ends when it
+/// moves by less than a share of its error, or after so many steps.
 const STEP: f64 = 0.1;
 const LONGEST: f64 = 0.7;
 const SETTLED: f64 = 0.1;
