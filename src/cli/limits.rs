@@ -127,28 +127,28 @@ fn options(args: &Args) -> LimitsOptions {
 }
 
 /// The bar of what is under way, one after the other.
-struct Shown<'a> {
-    global: &'a Global,
+struct Shown {
+    is_wanted: bool,
     bar: Mutex<(ProgressBar, Instant)>,
 }
 
-impl<'a> Shown<'a> {
-    fn new(global: &'a Global) -> Self {
-        Shown { global, bar: Mutex::new((ProgressBar::hidden(), Instant::now())) }
+impl Shown {
+    fn new(global: &Global) -> Self {
+        Shown { is_wanted: !global.quiet, bar: Mutex::new((ProgressBar::hidden(), Instant::now())) }
     }
 
     fn show(&self, progress: LimitsProgress) {
         let mut bar = self.bar.lock().unwrap_or_else(PoisonError::into_inner);
         let (done, total) = match progress {
             LimitsProgress::Map => {
-                *bar = (progress::bar(self.global, None, "planet-free map"), Instant::now());
+                *bar = (progress::bar_if(self.is_wanted, None, "planet-free map"), Instant::now());
                 return;
             }
             LimitsProgress::Injections { done, total } | LimitsProgress::Full { done, total } => (done, total),
         };
         if done == 0 {
             bar.0.finish_and_clear();
-            *bar = (progress::bar(self.global, Some(total as u64), "first orbits"), Instant::now());
+            *bar = (progress::bar_if(self.is_wanted, Some(total as u64), "first orbits"), Instant::now());
             return;
         }
         let (bar, began) = &*bar;

@@ -8,7 +8,12 @@ use std::time::Duration;
 /// A bar of `total` steps, or a spinner where their number is not known; hidden with `--quiet` or when stderr is no
 /// terminal. Clear it with `finish_and_clear` before anything is printed.
 pub fn bar(global: &Global, total: Option<u64>, message: &'static str) -> ProgressBar {
-    if global.quiet || !std::io::stderr().is_terminal() {
+    bar_if(!global.quiet, total, message)
+}
+
+/// The same for threads that know of no ranks: hidden where it is not wanted.
+pub fn bar_if(is_wanted: bool, total: Option<u64>, message: &'static str) -> ProgressBar {
+    if !is_wanted || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
     // the message is cut where the terminal ends
