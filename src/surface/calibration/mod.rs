@@ -102,7 +102,16 @@ pub fn found(
         plain = coarsely(&without, values, *known)?;
     }
     report("fitting active regions");
-    let (star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
+    let (mut star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
+    let of_regions: Vec<Parameter> =
+        asked.fitted.iter().copied().filter(|parameter| Parameter::REGIONS.contains(parameter)).collect();
+    if star.numbers.is_empty() && !of_regions.is_empty() && of_regions.len() < asked.fitted.len() {
+        // a line that is right as it is must not count against regions
+        let (alone, of_alone) = MeasuredStar::of(&without, &plain, known, &of_regions)?;
+        if !alone.numbers.is_empty() {
+            (star, near) = (alone, of_alone);
+        }
+    }
     let mut imager = imager.clone();
     star.put_into(&mut imager);
     if !of_sets.is_empty() && !star.numbers.is_empty() {
