@@ -159,6 +159,9 @@ impl Profile {
     }
 }
 
+/// Profiles further apart than this (d) belong to different nights.
+pub const NIGHT_GAP_D: f64 = 0.3;
+
 /// Profiles night by night, in order of time; nights are more than `gap_d` apart.
 pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..times_d.len()).collect();

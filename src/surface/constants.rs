@@ -38,20 +38,20 @@ const SIGNIFICANT: f64 = 4.0;
 /// A slope of so many standard errors beside no orbit is integrated out: a planet makes the errors larger.
 const INTEGRATED: f64 = 3.0;
 
-/// The slope of each drift of `imager` (km/s per day) by velocities of this quadratic beside no orbit, RV offsets and
-/// systemic velocity free as the `nuisances` say, held at `vsys_kms`; and whether one is so steep that it is to be
-/// integrated out. `None` where they are not bounded.
+/// The slope of each drift of `imager` (km/s per day), where one is so steep that it is to be integrated out: by
+/// velocities of this quadratic beside no orbit, RV offsets and systemic velocity free as the `nuisances` say, held at
+/// `vsys_kms`.
 pub(super) fn slopes(
     held: &VelocityQuadratic,
     imager: &Imager,
     nuisances: &[Nuisance],
     vsys_kms: f64,
-) -> Option<(Vec<f64>, bool)> {
+) -> Option<Vec<f64>> {
     let (_, all) = commons(imager, nuisances, vsys_kms, held.len());
     let (values, sigmas) = common_velocities(held, &all, None)?;
     let found = found_drifts(imager, all.len(), &values, &sigmas);
     let is_steep = found.iter().any(|drift| drift.sigmas() > INTEGRATED);
-    Some((found.iter().map(|drift| drift.kms_d).collect(), is_steep))
+    is_steep.then(|| found.iter().map(|drift| drift.kms_d).collect())
 }
 
 /// The drifts of `imager`, their terms the last among so many common velocities of these `values`.

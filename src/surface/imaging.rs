@@ -12,7 +12,7 @@ mod profile;
 
 use crate::maxent::entropy::Entropy;
 use crate::planets::periodogram::offset::Common;
-use crate::star::observation::{Observations, nights};
+use crate::star::observation::{NIGHT_GAP_D, Observations, nights};
 use crate::star::{
     Brightness, Nearby, OwnMap, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid,
 };
@@ -24,9 +24,6 @@ use nalgebra::DVector;
 pub use data::Data;
 pub use drift::Drift;
 pub use problem::ImagingProblem;
-
-/// Profiles that are at most so far apart (d) are of one night.
-const NIGHT_GAP_D: f64 = 0.3;
 
 /// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,6 +209,11 @@ impl Imager {
         all
     }
 
+    /// Brightness of a spot over that of the photosphere in a data set.
+    pub fn contrast_of(&self, set: usize) -> f64 {
+        self.sets[set].contrast.unwrap_or(self.star.contrast)
+    }
+
     /// RV jitter of each profile over that of the star.
     pub fn jitter_share_of_each(&self) -> Vec<f64> {
         let share = |set: usize| self.jitter_shares.get(set).copied().unwrap_or(1.0);
@@ -277,6 +279,11 @@ impl Imager {
     /// Whether there are such velocities.
     pub fn has_common_velocities(&self) -> bool {
         !self.zero_points.is_empty() || !self.drifts.is_empty()
+    }
+
+    /// Whether any velocities are integrated out beside those of single profiles.
+    pub fn has_shared_velocities(&self) -> bool {
+        self.has_common_velocities() || !self.night_jitters_kms.is_empty()
     }
 
     /// Number of each profile's data set, from 1; empty where there is only one.

@@ -9,14 +9,11 @@ use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, orbits};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
-use crate::star::observation::nights;
+use crate::star::observation::{NIGHT_GAP_D, nights};
 use crate::surface::imaging::Imager;
 use crate::surface::{At, AtTarget};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
-
-/// Profiles further apart than this (d) belong to different nights.
-const NIGHT_GAP_D: f64 = 0.3;
 
 /// Fewest profiles that must remain without a night.
 const FEWEST: usize = 5;

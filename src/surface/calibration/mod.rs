@@ -68,33 +68,17 @@ pub fn found(
         asked.events.map(|by_hand| Events::of(imager, values, known, near, by_hand)).transpose()
     };
     report("fitting active regions");
-    let mut plain = coarsely(imager, values, *known)?;
-    let mut drifting = match asked.slope {
-        true => imager.clone().with_drifts(false),
-        false => imager.clone(),
-    };
-    let mut drift_kms_d = Vec::new();
-    // a steep one has bent the maps from which it was found
-    for _ in 0..2 {
-        let Some(kms_d) = slopes(&drifting, &plain, asked.nuisances)? else { break };
-        drifting.hold_drifts(&kms_d);
-        plain = coarsely(&drifting, values, *known)?;
-        drift_kms_d = kms_d;
-    }
-    let imager = if drift_kms_d.is_empty() { imager } else { &drifting };
-    let contrasts = |imager: &mut Imager, near: &Fitted| {
-        asked.contrasts.iter().map(|set| fitted_contrast(imager, near, *set)).collect::<Result<Vec<_>, NoFit>>()
-    };
-    let mut imager = imager.clone();
-    let mut of_sets = contrasts(&mut imager, &plain)?;
-    if !of_sets.is_empty() {
+    let given: Vec<f64> = asked.contrasts.iter().map(|set| imager.contrast_of(*set)).collect();
+    let plain = coarsely(imager, values, *known)?;
+    let (mut imager, mut plain, drift_kms_d) = with_drifts_held(imager, plain, values, known, &asked)?;
+    let mut contrasts = fit_contrasts(&mut imager, &plain, asked.contrasts, &given)?;
+    if !contrasts.is_empty() {
         plain = coarsely(&imager, values, *known)?;
     }
-    let imager = &imager;
-    let first = events(imager, plain.marginal.assumed)?;
+    let first = events(&imager, plain.marginal.assumed)?;
     if asked.fitted.is_empty() {
         let field = plain.marginal.assumed.into();
-        return Ok(FoundStar { star: None, events: first, drift_kms_d, contrasts: of_sets, field });
+        return Ok(FoundStar { star: None, events: first, drift_kms_d, contrasts, field });
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -102,33 +86,56 @@ pub fn found(
         plain = coarsely(&without, values, *known)?;
     }
     report("fitting active regions");
-    let (mut star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
-    let of_regions: Vec<Parameter> =
-        asked.fitted.iter().copied().filter(|parameter| Parameter::REGIONS.contains(parameter)).collect();
-    if star.numbers.is_empty() && !of_regions.is_empty() && of_regions.len() < asked.fitted.len() {
-        // a line that is right as it is must not count against regions
-        let (alone, of_alone) = MeasuredStar::of(&without, &plain, known, &of_regions)?;
-        if !alone.numbers.is_empty() {
-            (star, near) = (alone, of_alone);
-        }
-    }
-    let mut imager = imager.clone();
+    let (star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
     star.put_into(&mut imager);
-    if !of_sets.is_empty() && !star.numbers.is_empty() {
+    if !contrasts.is_empty() && !star.numbers.is_empty() {
         // the line of regions has taken up some of what spots were dark for
         star.put_into(&mut without);
         let Fitted { marginal, .. } = coarsely(&without, values, Known { start: Some(near.into()), ..*known })?;
         near = marginal.assumed;
-        of_sets = contrasts(&mut without, &Fitted::near(marginal))?;
-        of_sets.iter().zip(asked.contrasts).for_each(|(of, set)| imager.sets[*set].contrast = Some(of.value));
+        contrasts = fit_contrasts(&mut without, &Fitted::near(marginal), asked.contrasts, &given)?;
+        contrasts.iter().zip(asked.contrasts).for_each(|(of, set)| imager.sets[*set].contrast = Some(of.value));
     }
     let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts: of_sets, field: near.into() })
+    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts, field: near.into() })
 }
 
-/// The contrast of spots in a data `set`, which is put into the imager.
-fn fitted_contrast(imager: &mut Imager, near: &Fitted, set: usize) -> Result<FittedContrast, NoFit> {
-    let fitted = fit_contrast(imager, near, set)?;
-    imager.sets[set].contrast = Some(fitted.value);
-    Ok(fitted)
+/// The same profiles and field `plain` with drifts held where one is steep, and their slopes (km/s per day); no slopes
+/// where none is.
+fn with_drifts_held(
+    imager: &Imager,
+    mut plain: Fitted,
+    values: ParameterValues,
+    known: &Known,
+    asked: &Asked,
+) -> Result<(Imager, Fitted, Vec<f64>), NoFit> {
+    let mut drifting = imager.clone();
+    if asked.slope {
+        drifting = drifting.with_drifts(false);
+    }
+    let mut held = Vec::new();
+    // a steep one has bent the maps from which it was found
+    for _ in 0..2 {
+        let Some(kms_d) = slopes(&drifting, &plain, asked.nuisances)? else { break };
+        drifting.hold_drifts(&kms_d);
+        plain = coarsely(&drifting, values, *known)?;
+        held = kms_d;
+    }
+    let imager = if held.is_empty() { imager.clone() } else { drifting };
+    Ok((imager, plain, held))
+}
+
+/// The contrasts of spots in data `sets` with priors around those that were `given`, which are put into `imager`.
+fn fit_contrasts(
+    imager: &mut Imager,
+    near: &Fitted,
+    sets: &[usize],
+    given: &[f64],
+) -> Result<Vec<FittedContrast>, NoFit> {
+    let fit = |(set, given): (&usize, &f64)| {
+        let fitted = fit_contrast(imager, near, *set, *given)?;
+        imager.sets[*set].contrast = Some(fitted.value);
+        Ok(fitted)
+    };
+    sets.iter().zip(given).map(fit).collect()
 }

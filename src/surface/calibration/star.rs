@@ -104,11 +104,24 @@ pub struct MeasuredStar {
 
 impl MeasuredStar {
     /// Of the profiles of `imager`, the other parameters as those of `plain` spots, from the field of these; and the
-    /// field that goes with it.
+    /// field that goes with it. Where line and regions together gain too little, regions alone: a line that is right as
+    /// it is does not count against them.
     ///
     /// # Errors
     /// [`NoFit`].
     pub fn of(imager: &Imager, plain: &Fitted, known: &Known, fitted: &[Parameter]) -> Result<(Self, Assumed), NoFit> {
+        let together = MeasuredStar::by(imager, plain, known, fitted)?;
+        let is_of_regions = |parameter: &Parameter| Parameter::REGIONS.contains(parameter);
+        let regions: Vec<Parameter> = fitted.iter().copied().filter(is_of_regions).collect();
+        if !together.0.numbers.is_empty() || regions.is_empty() || regions.len() == fitted.len() {
+            return Ok(together);
+        }
+        let alone = MeasuredStar::by(imager, plain, known, &regions)?;
+        Ok(if alone.0.numbers.is_empty() { together } else { alone })
+    }
+
+    /// The same by all that is `fitted` or nothing.
+    fn by(imager: &Imager, plain: &Fitted, known: &Known, fitted: &[Parameter]) -> Result<(Self, Assumed), NoFit> {
         let values = plain.marginal.values;
         let star = imager.star.with(&values.surface);
         let value = |parameter: Parameter| match parameter {
@@ -142,10 +155,9 @@ impl MeasuredStar {
         let mut values = ParameterValues::of_eight([0.0; 8]);
         self.set(&mut values, |_| true);
         let star = imager.star.with(&values.surface);
-        imager
-            .sets
-            .iter_mut()
-            .for_each(|set| set.line = set.line.map(|own| own.in_proportion(&imager.star.line, &star.line)));
+        for set in &mut imager.sets {
+            set.line = set.line.map(|own| own.in_proportion(&imager.star.line, &star.line));
+        }
         imager.star = star;
         imager.mean_profile = self.mean_profile;
     }

@@ -38,15 +38,14 @@ impl FittedContrast {
     }
 }
 
-/// The contrast of spots in a data `set` by the field of `near`.
+/// The contrast of spots in a data `set` by the field of `near`, its prior around that which is `given`.
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn fit_contrast(imager: &Imager, near: &Fitted, set: usize) -> Result<FittedContrast, FieldError> {
+pub fn fit_contrast(imager: &Imager, near: &Fitted, set: usize, given: f64) -> Result<FittedContrast, FieldError> {
     let near = &near.marginal;
     let basis = Basis::coarse(&imager.grid, DEGREE);
-    let given = imager.sets[set].contrast.unwrap_or(imager.star.contrast);
-    let centre = (1.0 - given).ln();
+    let [centre, here] = [given, imager.contrast_of(set)].map(|contrast| (1.0 - contrast).ln());
     let bounds = (DARKNESS.0.ln(), DARKNESS.1.ln());
     let height = |place: f64| {
         let mut imager = imager.clone();
@@ -55,7 +54,7 @@ pub fn fit_contrast(imager: &Imager, near: &Fitted, set: usize) -> Result<Fitted
         let marginal = Marginal::new(&imager, &basis, design, near.values, near.assumed, Some(near))?;
         Ok(marginal.ln_evidence() - 0.5 * ((place - centre) / PRIOR).powi(2))
     };
-    let (mut place, mut step) = (centre.clamp(bounds.0, bounds.1), STEP);
+    let (mut place, mut step) = (here.clamp(bounds.0, bounds.1), STEP);
     let mut bend = PRIOR.powi(-2);
     for _ in 0..STEPS {
         // within the bounds, where the middle one is not the best by much: a parabola through three

@@ -109,7 +109,7 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
-        match imager.has_common_velocities() || !imager.night_jitters_kms.is_empty() {
+        match imager.has_shared_velocities() {
             false => Ok(self.ln_evidence()),
             true => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
         }
@@ -172,16 +172,15 @@ impl Marginal {
 
 /// RV offsets of nights are noise of the velocities: they are integrated out of all that is said of these.
 fn with_night_offsets(imager: &Imager, quadratic: Quadratic) -> Result<Quadratic, FieldError> {
-    match imager.night_jitters_kms.is_empty() {
-        true => Ok(quadratic),
-        false => {
-            let offsets = imager.night_offsets(quadratic.gradient.len());
-            with_integrated(quadratic, &offsets)
-        }
-    }
+    let offsets = imager.night_offsets(quadratic.gradient.len());
+    with_integrated(quadratic, &offsets)
 }
 
-fn with_integrated(quadratic: Quadratic, common: &[Common]) -> Result<Quadratic, FieldError> {
+/// The quadratic with velocities that profiles have in `common` integrated out.
+pub(super) fn with_integrated(quadratic: Quadratic, common: &[Common]) -> Result<Quadratic, FieldError> {
+    if common.is_empty() {
+        return Ok(quadratic);
+    }
     let columns = DMatrix::from_columns(&common.iter().map(|one| one.of_each.clone()).collect::<Vec<_>>());
     let of_each = |number: fn(&Common) -> f64| DVector::from_iterator(common.len(), common.iter().map(number));
     let (mean, sd) = (of_each(|one| one.mean_kms), of_each(|one| one.sd_kms));

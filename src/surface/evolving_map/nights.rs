@@ -8,7 +8,7 @@ use crate::field::{Field, Kernel, Lifetime};
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::sampling::log_density::Status;
-use crate::star::observation::Observations;
+use crate::star::observation::{self, Observations};
 use crate::surface::checks::Checks;
 use crate::surface::imaging::{Data, Imager};
 use crate::surface::maps::{Against, MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots, rms, scatter};
@@ -160,9 +160,8 @@ fn is_static(marginal: &Marginal) -> bool {
 
 /// Mean times (d) of the nights.
 fn nights(times_d: &[f64]) -> Vec<f64> {
-    let mut times_d = times_d.to_vec();
-    times_d.sort_by(f64::total_cmp);
-    times_d.chunk_by(|a, b| b - a <= NIGHT_GAP_D).map(mean).collect()
+    let of_night = |night: Vec<usize>| mean(&night.iter().map(|k| times_d[*k]).collect::<Vec<_>>());
+    observation::nights(times_d, NIGHT_GAP_D).into_iter().map(of_night).collect()
 }
 
 fn mean(x: &[f64]) -> f64 {

@@ -2,10 +2,11 @@
 //! section 9) holds star, field, times and noise, but no data. What it depends on beside is the map that model and
 //! slopes are made linear at: one that is drawn from the field, given the data that there are.
 
-use super::expand::summed;
+use super::expand::{summed, with_integrated};
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Epoch, Evidence, FieldError};
 use crate::model::{Parameter, ParameterValues};
+use crate::planets::periodogram::offset::Common;
 use crate::planets::velocities::VelocityQuadratic;
 use crate::surface::expansion::{Expansion, Nuisance, STELLAR, coordinates};
 use crate::surface::imaging::Imager;
@@ -108,7 +109,12 @@ impl<'a> Planned<'a> {
         let (field, degrees) = (self.assumed.field, &self.basis.degrees);
         let evidence = Evidence::new(field, degrees, &some, &around, self.basis.settling.compression)?;
         let stellar = self.stellar();
-        let information = summed(evidence.quadratic(), some.len(), some.len(), stellar.len()).information;
+        let quadratic = summed(evidence.quadratic(), some.len(), some.len(), stellar.len());
+        let offsets = self.imager.night_offsets(maps.ncols()).into_iter().map(|offset| Common {
+            of_each: DVector::from_fn(quadratic.gradient.len(), |i, _| part.get(i).map_or(0.0, |k| offset.of_each[*k])),
+            ..offset
+        });
+        let information = with_integrated(quadratic.clone(), &offsets.collect::<Vec<_>>())?.information;
         let all = self.imager.cycles();
         let cycles: Vec<f64> = part.iter().map(|k| all[*k]).collect();
         let expansion = Expansion {

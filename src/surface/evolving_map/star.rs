@@ -131,8 +131,7 @@ pub fn slopes(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<
     }
     let (marginal, basis) = (&near.marginal, Basis::coarse(&imager.grid, DEGREE));
     let held = marginal.known_zero_points(imager, &basis, &[])?.velocities(&[]);
-    let slopes = constants::slopes(&held, imager, nuisances, marginal.values[Parameter::Vsys]);
-    Ok(slopes.and_then(|(kms_d, is_steep)| is_steep.then_some(kms_d)))
+    Ok(constants::slopes(&held, imager, nuisances, marginal.values[Parameter::Vsys]))
 }
 
 /// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
