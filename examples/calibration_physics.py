@@ -109,7 +109,7 @@ def run(args):
     args.work.mkdir(parents=True, exist_ok=True)
     done = {key(row) for row in calibration_table.resumed(args.csv)}
     for number in range(args.first, args.first + args.seeds):
-        for planet in (False, True):
+        for planet in (False,) if args.without_planets else (False, True):
             for effect in args.effects:
                 for setting in SETTINGS if effect == "none" else SETTINGS[:1]:
                     if (effect, str(number), str(int(planet)), setting) not in done:
@@ -223,6 +223,7 @@ if __name__ == "__main__":
     parser.add_argument("--work", type=Path, default=Path("target/calibration-physics"), help="folder of the stars")
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/physics.csv"))
     parser.add_argument("--out", type=Path, default=Path("results/real-stars.md"))
+    parser.add_argument("--without-planets", action="store_true", help="only stars without a planet")
     parser.add_argument("--table", action="store_true", help="write the tables of the lines so far")
     args = parser.parse_args()
     if args.table:
