@@ -83,11 +83,8 @@ fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
     let settings = DetectionSettings {
-        surface: SurfaceSettings::spottedness(scene.chi2_target),
-        nuisances: Vec::new(),
         search: SearchSettings { draws, seed: 1 },
-        eccentric: false,
-        second_planet: false,
+        ..DetectionSettings::of(SurfaceSettings::spottedness(scene.chi2_target), Vec::new())
     };
     Ok(Detection::find(imager, scene.settings.values, frequencies(imager)?, &settings, &|_| ())?)
 }

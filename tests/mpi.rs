@@ -78,7 +78,7 @@ fn mpirun(desk: &Desk, ranks: usize, program: &str, args: &[&str]) -> Command {
     command.args(["--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-n", &ranks.to_string(), program]);
     command.args(args).current_dir(desk.path("")).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Open MPI's launcher sleeps for a second between SIGTERM and SIGKILL, now and then even with nobody left to kill
-    command.env("OMPI_MCA_odls_base_sigkill_timeout", "0");
+    command.env("OMPI_MCA_odls_base_sigkill_timeout", "0").env("DIMCMC_CACHE", "off");
     command
 }
 

@@ -6,7 +6,7 @@
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
-use crate::runs::{grid_scan, run};
+use crate::runs::{fitted, grid_scan, run};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub fn scene(config: &Config) -> Result<Scene, SceneError> {
 /// The same with numbers of the star that the config leaves to the profiles.
 pub fn fitted(global: &Global, scene: Scene) -> Scene {
     let spinner = progress::bar(global, None, "profiles");
-    let scene = scene.fitted(&|what| spinner.set_message(what.to_owned()));
+    let scene = fitted::fitted(scene, &|what| spinner.set_message(what.to_owned()));
     spinner.finish_and_clear();
     scene
 }

@@ -19,7 +19,7 @@ use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::{self, Asked, FoundStar};
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Known, NoMaps, SurfaceMaps, SurfaceSettings};
+use crate::surface::{At, Known, NoMaps, OtherRotation, SurfaceMaps, SurfaceSettings};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -118,20 +118,23 @@ impl Scene {
     pub fn fitted(mut self, report: &dyn Fn(&str)) -> Self {
         let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
         let contrasts = self.fitted_contrasts();
+        let (known, values) = (self.settings.known_field(), self.settings.values);
+        let rotation = self.settings.imaging.objective.properties().marginalises && known.lifetime.is_none();
         let is_open = !fitted.is_empty() || by_hand.is_some() || !contrasts.is_empty();
-        if !is_open || self.measured.star.is_some() || self.measured.events.is_some() {
+        if !(is_open || rotation) || self.measured.field_start.is_some() {
             return self;
         }
-        let (known, values) = (self.settings.known_field(), self.settings.values);
         let (nuisances, slope) = (nuisances(&self.settings.free), self.settings.drift.is_none());
         let events = by_hand.as_deref();
-        let asked = Asked { fitted: &fitted, events, slope, contrasts: &contrasts, nuisances: &nuisances };
+        let contrasts = &contrasts[..];
+        let asked = Asked { fitted: &fitted, events, slope, contrasts, nuisances: &nuisances, rotation };
         match calibration::found(&self.imager, values, &known, asked, report) {
-            Ok(FoundStar { star, events, drift_kms_d, contrasts: of_sets, field }) => {
+            Ok(FoundStar { star, events, drift_kms_d, contrasts: of_sets, other_rotation, field }) => {
                 let field_start = Some(field);
                 let mut sets = self.measured.sets.clone();
                 contrasts.iter().zip(of_sets).for_each(|(set, contrast)| sets[*set].contrast = Some(contrast));
-                self.with_found(&Measured { star, events, drift_kms_d, field_start, sets, ..Measured::default() })
+                let kept = Measured { star, events, drift_kms_d, other_rotation, field_start, ..Measured::default() };
+                self.with_found(&Measured { sets, ..kept })
             }
             Err(error) => {
                 self.measured.profiles.push(format!("star and outliers not fitted: {error}"));
@@ -181,6 +184,7 @@ impl Scene {
             None => self,
         };
         scene.measured.field_start = scene.measured.field_start.or(found.field_start);
+        scene.measured.other_rotation = scene.measured.other_rotation.or(found.other_rotation);
         scene = scene.with_contrasts(&found.sets);
         if scene.measured.drift_kms_d.is_empty() {
             scene = scene.with_drift(&found.drift_kms_d);
@@ -278,7 +282,8 @@ impl Scene {
     /// The search for the best parameters that the config asks for.
     #[doc(hidden)]
     pub fn search_settings(&self) -> SearchSettings {
-        SearchSettings::of(self.surface(), self.settings.sampler.seed)
+        let other_rotation = self.measured.other_rotation;
+        SearchSettings { other_rotation, ..SearchSettings::of(self.surface(), self.settings.sampler.seed) }
     }
 
     /// The maps of the star at the config's values, and whether they fit: one, one a season, or, where maps evolve, one
@@ -289,7 +294,9 @@ impl Scene {
     pub fn maps(&self, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps> {
         let nuisances = nuisances(&self.settings.free);
         let at = At { imager: &self.imager, values: self.settings.values, nuisances: &nuisances };
-        self.surface().model().maps(at, &self.observations, times_d)
+        let mut maps = self.surface().model().maps(at, &self.observations, times_d)?;
+        maps.warnings.extend(self.measured.other_rotation.iter().map(OtherRotation::sentence));
+        Ok(maps)
     }
 
     /// The best parameters, and the posterior with its reference there.

@@ -53,6 +53,8 @@ pub struct DetectionSettings {
     pub eccentric: bool,
     /// Whether a second planet is searched for.
     pub second_planet: bool,
+    /// Another rotation period with which the profiles are far more probable.
+    pub other_rotation: Option<OtherRotation>,
 }
 
 impl DetectionSettings {
@@ -64,6 +66,7 @@ impl DetectionSettings {
             search: SearchSettings::default(),
             eccentric: false,
             second_planet: false,
+            other_rotation: None,
         }
     }
 }
@@ -118,8 +121,6 @@ pub enum Stage {
     PlanetFree,
     /// Whether the star changes.
     Change,
-    /// Whether the rotation period is wrong.
-    Rotation,
     /// Periods, draws.
     Search,
     /// The image at the best orbit, for that many times.
@@ -216,8 +217,6 @@ impl Detection {
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
         let change = surface.evolution(at, &frequencies);
-        report(Stage::Rotation);
-        let other_rotation = surface.other_rotation(at, &planet_free);
         let mut found = Detection {
             best: *blind.best(),
             planet_free,
@@ -225,7 +224,7 @@ impl Detection {
             blind,
             frequencies,
             change,
-            other_rotation,
+            other_rotation: settings.other_rotation,
             at_best: None,
             rounds: 0,
             closed: false,

@@ -6,11 +6,11 @@ use crate::model::{Elements, Parameter, ParameterSpace, ParameterValues, for_bli
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::sampling::optimise::Optimum;
 use crate::star::Shape;
-use crate::surface::SurfaceSettings;
 use crate::surface::density::Density;
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, RIVAL_DISTANCE, Sought, shift, with_spots_of};
+use crate::surface::{OtherRotation, SurfaceSettings};
 
 pub use crate::surface::optimum::{Attempt, Progress, SearchError, Stage};
 
@@ -23,12 +23,14 @@ pub struct SearchSettings {
     pub other_starts: usize,
     /// Seed of those that are drawn.
     pub seed: u64,
+    /// Another rotation period with which the profiles are far more probable.
+    pub other_rotation: Option<OtherRotation>,
 }
 
 impl SearchSettings {
     /// The usual search.
     pub fn of(surface: SurfaceSettings, seed: u64) -> Self {
-        SearchSettings { surface, other_starts: OTHER_STARTS, seed }
+        SearchSettings { surface, other_starts: OTHER_STARTS, seed, other_rotation: None }
     }
 }
 
@@ -88,10 +90,10 @@ pub fn find(
     settings: SearchSettings,
     report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, SearchError> {
-    let SearchSettings { surface, other_starts, seed } = settings;
+    let SearchSettings { surface, other_starts, seed, other_rotation } = settings;
     let (model, sought) = (surface.model(), Sought { imager, space, other_starts, seed });
     report(Progress { stage: Stage::FirstImage, evaluations: 0 });
-    let blind = if model.begins_with_blind_search() { blind(imager, space, surface) } else { None };
+    let blind = model.begins_with_blind_search().then(|| blind(imager, space, surface, other_rotation)).flatten();
     let (detection, start) = blind.map_or((None, None), |(detection, start)| (Some(Box::new(detection)), start));
     let start = detection.as_ref().zip(start);
     let start = start.map(|(detection, (theta, values))| BlindStart { theta, values, here: detection.last() });
@@ -103,7 +105,12 @@ pub fn find(
 type Point = (Vec<f64>, ParameterValues);
 
 /// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
-fn blind(imager: &Imager, space: &ParameterSpace, surface: SurfaceSettings) -> Option<(Detection, Option<Point>)> {
+fn blind(
+    imager: &Imager,
+    space: &ParameterSpace,
+    surface: SurfaceSettings,
+    other_rotation: Option<OtherRotation>,
+) -> Option<(Detection, Option<Point>)> {
     let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
     let sought = |of: &&Elements| is_free(of.k) && is_free(of.phi) && space.period_prior(of).is_some();
     let sought: Vec<&Elements> = Elements::PLANETS.iter().filter(sought).collect();
@@ -118,6 +125,7 @@ fn blind(imager: &Imager, space: &ParameterSpace, surface: SurfaceSettings) -> O
     let wanted = DetectionSettings {
         eccentric: is_free(first.shape[0]),
         second_planet: beside,
+        other_rotation,
         ..DetectionSettings::of(surface, nuisances(space.free()))
     };
     let config = space.values_at(&space.start());

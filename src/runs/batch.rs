@@ -7,6 +7,7 @@ use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
 use crate::inference::search;
 use crate::planets::verdict::Verdict;
+use crate::runs::fitted::fitted;
 use crate::runs::manifest::{self, Manifest, RunSummary};
 #[cfg(feature = "mpi")]
 use crate::runs::pool::orbit_from_bytes;
@@ -110,7 +111,7 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
         }
         Run::resume(&scene, folder, None, pool)?
     } else {
-        scene = scene.fitted(&|_| ());
+        scene = fitted(scene, &|_| ());
         let settings = scene.search_settings();
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
         Run::in_memory(&scene, found, StartFrom::Optimum, pool)?.kept_in(folder, true)?

@@ -177,7 +177,7 @@ impl FreeVelocities {
     /// those of this star.
     fn warning(&self, scene: &Scene, maps: &SurfaceMaps) -> Option<String> {
         let absorbs = maps.field.as_ref().and_then(SpotField::absorbs);
-        if maps.other_rotation.is_some_and(|other| other.is_far()) || absorbs.is_some() {
+        if scene.measured.other_rotation.is_some_and(|other| other.is_far()) || absorbs.is_some() {
             return None;
         }
         let jitter_kms = maps.field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);

@@ -7,7 +7,7 @@ use super::evolving_map::{FluxFit, NoFit};
 use super::imaging::Imager;
 use super::nuisances::LineAndContinuum;
 use super::static_map::ReferenceError;
-use super::{FilteredVelocity, Linearised, OtherRotation, SpotField};
+use super::{FilteredVelocity, Linearised, SpotField};
 use crate::model::ParameterValues;
 use crate::numerics::json::{Part, number_or_null, part};
 use crate::sampling::log_density::Status;
@@ -40,9 +40,6 @@ pub struct SurfaceMaps {
     pub trade_off: Vec<TradeOffNode>,
     /// The spots as a field, where they are one.
     pub field: Option<SpotField>,
-    /// Another rotation period with which the profiles are far more probable.
-    #[doc(hidden)]
-    pub other_rotation: Option<OtherRotation>,
     /// The star linearised with these maps, where they evolve.
     #[doc(hidden)]
     pub here: Option<Linearised>,

@@ -5,9 +5,7 @@ use super::expansion::{Expansion, Nuisance};
 use super::imaging::Imager;
 use super::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use super::record::{RebuildError, SurfaceRecord};
-use super::{
-    AtTarget, Change, Explained, Linearised, NoFit, NoMaps, OtherRotation, SurfaceError, SurfaceMaps, WithoutJitter,
-};
+use super::{AtTarget, Change, Explained, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps, WithoutJitter};
 use crate::model::{ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
 use crate::planets::velocities::VelocityQuadratic;
@@ -83,11 +81,6 @@ pub trait SurfaceModel: Debug + Send + Sync {
 
     /// Whether the spots evolve, where the model takes them for static; `None` where that is not asked.
     fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>>;
-
-    /// Another rotation period with which the profiles are far more probable, as far as that can be told.
-    fn other_rotation(&self, _at: At, _here: &Linearised) -> Option<OtherRotation> {
-        None
-    }
 
     /// Whether spots imitate orbits at fractions of the rotation period, too.
     fn imitates_at_fractions(&self) -> bool;

@@ -1,7 +1,7 @@
 //! What users and systems do to a program: streams that are gone, signals at any time, full disks, missing permissions,
 //! numbers beyond sense, `--force` into the wrong place, edited results, control characters in names.
 
-use crate::desk::{Desk, PROGRAM, dimcmc, says, text, tiny};
+use crate::desk::{Desk, PROGRAM, dimcmc, program, says, text, tiny};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -66,13 +66,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
         desk.set("/imaging", json!({ "pixels": 50_000, "chi2_target": 1.05, "objective": "spottedness" }));
         let run = |name: &str, stderr: Stdio| {
             let args = ["sample", "config.json", "--out", name];
-            Command::new(PROGRAM)
-                .args(args)
-                .current_dir(desk.path(""))
-                .stderr(stderr)
-                .stdout(Stdio::null())
-                .spawn()
-                .unwrap()
+            program().args(args).current_dir(desk.path("")).stderr(stderr).stdout(Stdio::null()).spawn().unwrap()
         };
         let mut child = run("early", stderr);
         catches_signals(&mut child);
@@ -83,7 +77,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
     desk.write("config.json", &long().to_string());
     for (k, stderr) in broken().into_iter().enumerate() {
         let name = format!("late{k}");
-        let mut command = Command::new(PROGRAM);
+        let mut command = program();
         command.args(["sample", "config.json", "--out", &name]).current_dir(desk.path(""));
         let mut child = command.stderr(stderr).stdout(Stdio::null()).spawn().unwrap();
         desk.wait_for_lines(&format!("{name}/chain.jsonl"), &mut child, 24);
@@ -92,7 +86,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
     }
     // what is wrong has its exit code, whoever listens
     for stderr in broken() {
-        let mut command = Command::new(PROGRAM);
+        let mut command = program();
         let child =
             command.args(["map", "absent.json", "--out", "x"]).current_dir(desk.path("")).stderr(stderr).spawn();
         assert_eq!(code(child.unwrap()), Some(2));
@@ -104,7 +98,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
 fn results_that_cannot_be_printed_are_a_failure_and_a_closed_pipe_is_none() {
     let desk = Desk::new(tiny(2));
     for (k, (stdout, expected)) in broken().into_iter().zip([1, 0]).enumerate() {
-        let mut command = Command::new(PROGRAM);
+        let mut command = program();
         command.args(["map", "config.json", "--out", &format!("map{k}")]).current_dir(desk.path(""));
         let output = command.stdout(stdout).stderr(Stdio::piped()).output().unwrap();
         assert_eq!(output.status.code(), Some(expected), "{}", text(&output.stderr));

@@ -1,6 +1,6 @@
 //! What of the star itself is fitted before maps and searches: active regions, line and vsini; and drifts.
 
-use super::desk::{Desk, says, two_spots};
+use super::desk::{Desk, program, says, two_spots};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -48,6 +48,40 @@ fn regions_are_found_where_they_are_and_nowhere_else() {
         let [value, sigma] = ["value", "sigma"].map(|key| number[key].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * sigma, "{name}: {value} +- {sigma}, not {truth}");
     }
+}
+
+/// A second command takes what the first has fitted, to the same bytes; what is damaged or of other profiles is fitted
+/// again, and nothing is kept where nothing is to be.
+#[test]
+fn what_is_fitted_is_kept_for_the_next_command() {
+    let (desk, config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
+    desk.write(CONFIG, &config.to_string());
+    let map = |cache: &str, out: &str| {
+        let mut command = program();
+        command.args(["map", CONFIG, "--out", out, "--force"]).current_dir(desk.path("")).env("DIMCMC_CACHE", cache);
+        assert!(command.output().unwrap().status.success());
+        desk.read(&format!("{out}/fit.json"))
+    };
+    let kept = || std::fs::read_dir(desk.path("cache")).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
+    let by_itself = map("off", "map");
+    assert!(!desk.path("cache").exists());
+    assert_eq!(map("cache", "first"), by_itself);
+    let [file] = &kept()[..] else { panic!("{:?}", kept()) };
+    assert_eq!(map("cache", "second"), by_itself);
+    // another gain is told as it stands there
+    let whole = std::fs::read_to_string(file).unwrap();
+    let mut measured: Value = serde_json::from_str(&whole).unwrap();
+    measured["star"]["gain"] = json!(3.25);
+    std::fs::write(file, measured.to_string()).unwrap();
+    map("cache", "second");
+    assert_eq!(desk.json("second/fit.json")["measured"]["star"]["gain"], 3.25);
+    std::fs::write(file, &whole[..whole.len() / 2]).unwrap();
+    assert_eq!(map("cache", "second"), by_itself);
+    assert_eq!(std::fs::read_to_string(file).unwrap(), whole);
+    let list = desk.read("data/observations.txt");
+    desk.write("data/observations.txt", list.lines().skip(4).collect::<Vec<_>>().join("\n").as_str());
+    map("cache", "fewer");
+    assert_eq!(kept().len(), 2);
 }
 
 /// The line and vsini that a config has wrong are put right, and a chain goes on with them as if it had not stopped.

@@ -65,8 +65,23 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// Where it keeps what it fits to profiles, for the next test.
+pub const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/fitted");
+
+/// The program, ready to be told what to do.
+pub fn program() -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.env("DIMCMC_CACHE", CACHE);
+    command
+}
+
+/// Runs it; where the number of threads is given, it fits everything itself.
 pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
-    Command::new(PROGRAM).args(args).current_dir(folder).output().unwrap()
+    let mut command = program();
+    if args.contains(&"--threads") {
+        command.env("DIMCMC_CACHE", "off");
+    }
+    command.args(args).current_dir(folder).output().unwrap()
 }
 
 pub fn text(bytes: &[u8]) -> String {
@@ -121,7 +136,7 @@ impl Desk {
 
     /// Starts the program and does not wait for it.
     pub fn start(&self, args: &[&str]) -> Child {
-        let mut command = Command::new(PROGRAM);
+        let mut command = program();
         command.args(args).current_dir(self.path("")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     }
 

@@ -33,6 +33,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
         "runs",
         &[
             "cluster",
+            "fitted",
             "origin",
             "blind_search",
             "limits",

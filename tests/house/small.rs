@@ -1,7 +1,7 @@
 //! A small star to run commands on: the demo with a third of its profiles, few pixels and short chains; and a shell's
 //! line, run.
 
-use crate::desk::{Desk, PROGRAM, copy, dimcmc, text};
+use crate::desk::{CACHE, Desk, PROGRAM, copy, dimcmc, text};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -88,6 +88,7 @@ pub fn run(line: &str, desk: &Desk) -> String {
     let to = |name: &str| Stdio::from(std::fs::File::create(desk.path(name)).unwrap());
     let mut shell = Command::new("sh");
     shell.args(["-euc", &format!("exec {line}")]).current_dir(desk.path("")).env("PATH", path.unwrap());
+    shell.env("DIMCMC_CACHE", CACHE);
     let mut child = shell.stdout(to("stdout.txt")).stderr(to("stderr.txt")).spawn().unwrap();
     let began = Instant::now();
     let status = loop {

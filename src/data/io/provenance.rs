@@ -7,7 +7,7 @@ use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::target::ChosenTarget;
-use crate::surface::{ConstantVelocity, FieldStart, FittedContrast};
+use crate::surface::{ConstantVelocity, FieldStart, FittedContrast, OtherRotation};
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.
@@ -62,6 +62,9 @@ pub struct Measured {
     /// The field of spots that was fitted on the way to star and events, from which a fit with finer maps begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_start: Option<FieldStart>,
+    /// Another rotation period with which the profiles are far more probable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_rotation: Option<OtherRotation>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,

@@ -6,7 +6,7 @@ use crate::data::io::csv::{Columns, DATA_SET};
 use crate::data::io::lsd;
 use crate::data::io::map::{FIT, FitFile, UNCHANGING};
 use crate::data::io::truth::{self, TruthFile};
-use crate::figures::drawing::colour::{BLACK, GREY, VERMILION};
+use crate::figures::drawing::colour::{BLACK, GREY, PURPLE, VERMILION};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
 use crate::runs::origin;
 use std::path::Path;
@@ -28,6 +28,8 @@ pub(super) struct Line {
     pub unchanging: Vec<f64>,
     /// Number of its data set, where there are several.
     pub data_set: Option<usize>,
+    /// Factor on its errors, where the others do not predict it.
+    pub sigma_factor: Option<f64>,
 }
 
 impl Line {
@@ -40,9 +42,11 @@ impl Line {
 /// The profiles of a map, in the order of their phase.
 pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
+    let mut events = Vec::new();
     if folder.join(FIT).is_file() {
-        let data = origin::read::<FitFile>(folder, FIT)?.summary.data;
-        table.check_rows(data, &format!("the data, by {FIT}"))?;
+        let fit: FitFile = origin::read(folder, FIT)?;
+        table.check_rows(fit.summary.data, &format!("the data, by {FIT}"))?;
+        events = fit.provenance.measured.events.map(|events| events.profiles).unwrap_or_default();
     }
     let numbers = table.column("profile")?;
     let [cycle, velocity] = [table.column_within("cycle", ANY)?, table.column_within("velocity_kms", ANY)?];
@@ -54,7 +58,9 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     for k in 0..numbers.len() {
         if k == 0 || numbers[k] != numbers[k - 1] {
             let data_set = data_set.map(|of| of[k] as usize);
-            lines.push(Line { time_d: time_d[k], cycle: cycle[k], data_set, ..Line::default() });
+            let event = events.iter().find(|event| event.profile as f64 == numbers[k] + 1.0);
+            let sigma_factor = event.map(|event| event.sigma_factor);
+            lines.push(Line { time_d: time_d[k], cycle: cycle[k], data_set, sigma_factor, ..Line::default() });
         }
         let line = lines.last_mut().expect("the first row begins a profile");
         line.velocity_kms.push(velocity[k]);
@@ -81,6 +87,7 @@ pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
         model: Vec::new(),
         unchanging: Vec::new(),
         data_set: None,
+        sigma_factor: None,
     };
     sorted(observations.profiles.iter().map(line).collect(), &list)
 }
@@ -120,6 +127,10 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         phase. Bars \
          beside the profiles are plus and minus one standard error."
     );
+    let eventful = lines.iter().any(|line| line.sigma_factor.is_some());
+    if eventful {
+        figure.caption += " Purple: profiles that the others do not predict; their errors are enlarged (bars).";
+    }
     if lines.iter().any(|line| line.data_set.is_some()) {
         figure.caption += " In parentheses: the number of the data set.";
     }
@@ -156,6 +167,9 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     legend.add(Key::Line(OBSERVED), "observed");
     if modelled {
         legend.add(Key::Line(MODEL), "model");
+        if eventful {
+            legend.add(Key::Line(EVENT), "event");
+        }
         legend.row(&mut figure, [legend_middle, 9.0]);
     }
     figure
@@ -164,12 +178,14 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
 const TINY: Font = Font { size: 6.0, ..Font::SMALL };
 
 const OBSERVED: Stroke = Stroke::new(BLACK, 1.2);
+const EVENT: Stroke = Stroke::new(PURPLE, 1.2);
 const MODEL: Stroke = Stroke::new(VERMILION, 0.6);
 
 /// One profile, lowered by `down`.
 fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let points = |y: &[f64]| line.velocity_kms.iter().zip(y).map(|(v, i)| [*v, i - down]).collect::<Vec<_>>();
-    panel.line(figure, "observed", &points(&line.observed), OBSERVED);
+    let observed = if line.sigma_factor.is_some() { EVENT } else { OBSERVED };
+    panel.line(figure, "observed", &points(&line.observed), observed);
     panel.line(figure, "model", &points(&line.model), MODEL);
     let turns = line.cycle - line.phase();
     let (last, level) =

@@ -7,7 +7,8 @@ use super::times::{Clock, Stretch, stretches};
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};
-use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
+use crate::data::io::provenance::Provenance;
+use crate::figures::drawing::colour::{BLACK, BLUE, GREY, PURPLE, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
 use crate::planets::verdict::speed;
@@ -49,6 +50,8 @@ struct Curves<'a> {
     sigma: [Option<f64>; 2],
     /// What the orbit is called.
     orbit_is: &'static str,
+    /// Profiles whose errors are enlarged, from 0.
+    events: Vec<usize>,
 }
 
 /// The velocities of maps: marginalised over maps, or with the model's spots taken out.
@@ -84,6 +87,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         rotation_period_d: ephemeris(&fit.provenance.config).map_or(f64::NAN, |(period_d, _)| period_d),
         sigma: [None; 2],
         orbit_is: "assumed orbit",
+        events: events(&fit.provenance, fit.summary.profiles),
     };
     let mut figure = curves.draw();
     let spots = match fit.field.is_some() {
@@ -91,13 +95,13 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         false => "spots of the model taken out",
     };
     let folded = match curves.folds() {
-        true => " Bottom: residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity",
+        true => " Bottom: residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity.",
         false => "",
     };
     figure.caption = format!(
         "Radial velocities. Top: first moments of the observed profiles and of the model. Below: {spots}{}.{folded}{}",
         if curves.folds() { ", and the assumed orbit" } else { "" },
-        if curves.folds() { "." } else { "" },
+        curves.of_events(),
     );
     Ok(figure)
 }
@@ -139,19 +143,28 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
         rotation_period_d: period_d / porb_over_prot,
         sigma: [Some(sigma_k_kms), sigma_porb_over_prot],
         orbit_is: "best orbit",
+        events: events(&file.provenance, cycle.len()),
     };
     let mut figure = curves.draw();
-    figure.caption =
+    figure.caption = format!(
         "Radial velocities. Top: first moments of the profiles. Middle: spots marginalised out, and the best orbit; \
         uncertainties are correlated, bars are the diagonal of the covariance (covariance.csv), without the \
         uncertainty of systemic velocity and RV offsets, which shifts all profiles of a data set alike. Bottom: \
-        residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity."
-            .into();
+        residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity.{}",
+        curves.of_events(),
+    );
     Ok(figure)
+}
+
+/// Which of so many profiles have enlarged errors, from 0.
+fn events(provenance: &Provenance, profiles: usize) -> Vec<usize> {
+    let events = provenance.measured.events.iter().flat_map(|events| &events.profiles);
+    (0..profiles).filter(|k| events.clone().any(|event| event.profile == k + 1)).collect()
 }
 
 const POINT: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Disc, 3.2, BLACK);
 const MODEL: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Diamond, 2.6, VERMILION);
+const EVENT: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Ring, 6.5, PURPLE);
 const ORBIT: Stroke = Stroke::new(BLUE, 1.0);
 
 /// Panels on the left: heights of first moments, velocities without spots, and residuals, as shares.
@@ -200,6 +213,9 @@ impl Curves<'_> {
         figure.text("rotation cycle", [middle, top - 13.0], Font::LABEL, Align::Centre, 0.0);
         figure.text(&clock.label, [middle, below + 19.0], Font::LABEL, Align::Centre, 0.0);
         let mut legend = legend(&self.moments);
+        if !self.events.is_empty() {
+            legend.add(Key::Point(EVENT.0, EVENT.2), "event");
+        }
         if self.folds() {
             legend.add(Key::Line(ORBIT), self.orbit_is);
             let beside =
@@ -237,6 +253,19 @@ impl Curves<'_> {
         let inside: Vec<usize> = (0..self.time_d.len()).filter(|k| part.holds(self.time_d[*k])).collect();
         let times: Vec<f64> = inside.iter().map(|k| self.time_d[*k] - clock.zero_d).collect();
         series.iter().for_each(|one| one.only(&inside).draw(figure, panel, &times, unit));
+        let here: Vec<usize> = self.events.iter().copied().filter(|event| inside.contains(event)).collect();
+        let times: Vec<f64> = here.iter().map(|k| self.time_d[*k] - clock.zero_d).collect();
+        series[0].only(&here).ring(figure, panel, &times, unit);
+    }
+
+    /// What rings are, for the caption.
+    fn of_events(&self) -> &'static str {
+        match self.events.is_empty() {
+            true => "",
+            false => {
+                " Rings: profiles that the others do not predict (flares, cosmic rays); their errors are enlarged."
+            }
+        }
     }
 
     /// Rotation cycle at a time (d).
@@ -267,10 +296,13 @@ impl Curves<'_> {
         let curve: Vec<[f64; 2]> = (0..=200).map(|i| f64::from(i) / 200.0).map(|t| [t, rv(t)]).collect();
         panel.line(figure, "orbit", &curve, ORBIT);
         alone.draw(figure, &panel, &phases, unit);
+        let at_events: Vec<f64> = self.events.iter().map(|k| phases[*k]).collect();
+        alone.only(&self.events).ring(figure, &panel, &at_events, unit);
         panel.frame(figure, Sides { below: false, left: true });
         let residuals = Panel { frame: below, x, y: unit.axis("residual", range(&[&self.residual], 0.0)) };
         residuals.horizontal(figure, "zero", 0.0, Stroke::new(GREY, 0.6).dashed());
         self.residual.draw(figure, &residuals, &phases, unit);
+        self.residual.only(&self.events).ring(figure, &residuals, &at_events, unit);
         residuals.frame(figure, Sides::BOTH);
         let digits = |sigma: Option<f64>| decimals(sigma.unwrap_or(f64::NAN));
         let [k, ratio] = [speed(k_kms, self.sigma[0].unwrap_or(0.1 * k_kms)), {
@@ -320,6 +352,12 @@ impl<'a> Series<'a> {
     fn only(&self, these: &[usize]) -> Series<'a> {
         let of = |all: &[f64]| these.iter().filter_map(|k| all.get(*k).copied()).collect();
         Series { y: of(&self.y), sigma: of(&self.sigma), ..*self }
+    }
+
+    /// Rings around them.
+    fn ring(&self, figure: &mut Figure, panel: &Panel, x: &[f64], unit: Speeds) {
+        let points: Vec<[f64; 2]> = x.iter().zip(&self.y).map(|(x, y)| [*x, unit.factor * y]).collect();
+        panel.points(figure, "event", &points, EVENT);
     }
 
     fn draw(&self, figure: &mut Figure, panel: &Panel, x: &[f64], unit: Speeds) {

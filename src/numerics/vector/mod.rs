@@ -143,6 +143,14 @@ pub fn by_each<T: Task>(mut task: impl FnMut() -> T) -> Vec<T::Output> {
     outputs
 }
 
+/// Whether products and sums are rounded once, as vector instructions do: results differ in their last digits.
+pub fn is_fused() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return has_avx2();
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
 #[cfg(target_arch = "x86_64")]
 fn has_avx2() -> bool {
     std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")

@@ -91,6 +91,7 @@ impl BlindSearchOptions {
             search: SearchSettings { draws: self.draws, seed: self.seed },
             eccentric: self.eccentric,
             second_planet: self.second_planet,
+            other_rotation: scene.measured.other_rotation,
         }
     }
 }

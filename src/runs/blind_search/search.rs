@@ -139,7 +139,6 @@ fn message(stage: Stage) -> String {
     match stage {
         Stage::PlanetFree => "planet-free map".to_owned(),
         Stage::Change => "testing for spot evolution".to_owned(),
-        Stage::Rotation => "testing other rotation periods".to_owned(),
         Stage::Search => "searching, FAP simulations".to_owned(),
         Stage::BestOrbit(round) => format!("map at the best orbit, round {round}"),
         Stage::SecondPlanet => "searching for a second planet".to_owned(),

@@ -8,6 +8,7 @@ use crate::inference::detection::PlanetFree;
 use crate::model::for_blind_search;
 use crate::planets::periodogram::injections::Highest;
 use crate::planets::verdict::CANDIDATE_FAP;
+use crate::runs::fitted::fitted;
 use crate::star::Orbit;
 use crate::surface::At;
 use rand::{Rng, SeedableRng};
@@ -119,7 +120,7 @@ impl WholeWay {
     pub fn scene(&self) -> Result<Scene, WholeWayError> {
         let scene = Scene::new(&Config::at(self.resolved.clone(), &self.config))?;
         match scene.data_sha256 == self.data_sha256 {
-            true => Ok(scene.fitted(&|_| ())),
+            true => Ok(fitted(scene, &|_| ())),
             false => Err(WholeWayError::Changed(self.config.clone())),
         }
     }

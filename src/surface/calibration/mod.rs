@@ -16,7 +16,7 @@ use crate::surface::evolving_map::star::{coarsely, slopes};
 use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::{FieldStart, Known};
+use crate::surface::{FieldStart, Known, OtherRotation};
 use events::{ByHand, Events};
 use star::MeasuredStar;
 
@@ -33,6 +33,8 @@ pub struct Asked<'a> {
     pub contrasts: &'a [usize],
     /// Parameters that are integrated out.
     pub nuisances: &'a [Nuisance],
+    /// Whether the rotation period can be another one.
+    pub rotation: bool,
 }
 
 /// What they say.
@@ -46,6 +48,8 @@ pub struct FoundStar {
     pub drift_kms_d: Vec<f64>,
     /// Contrasts of spots of the data sets that have one each.
     pub contrasts: Vec<FittedContrast>,
+    /// Another rotation period with which the profiles are far more probable.
+    pub other_rotation: Option<OtherRotation>,
     /// Where a fit with finer maps begins.
     pub field: FieldStart,
 }
@@ -63,9 +67,16 @@ pub fn found(
     asked: Asked,
     report: &dyn Fn(&str),
 ) -> Result<FoundStar, NoFit> {
-    let events = |imager: &Imager, near: Assumed| {
+    let events = |imager: &Imager, values: ParameterValues, near: Assumed| {
         report("looking for flares and other events");
         asked.events.map(|by_hand| Events::of(imager, values, known, near, by_hand)).transpose()
+    };
+    let rotation = |imager: &Imager, values: ParameterValues, near: Assumed, events: Option<&Events>| {
+        report("checking the rotation period");
+        let factors =
+            events.filter(|events| !events.profiles.is_empty()).map(|of| of.factors(imager.profiles().count()));
+        let larger = factors.map(|factors| imager.with_larger_errors(&factors));
+        asked.rotation.then(|| OtherRotation::of(larger.as_ref().unwrap_or(imager), values, near, *known)).flatten()
     };
     report("fitting active regions");
     let given: Vec<f64> = asked.contrasts.iter().map(|set| imager.contrast_of(*set)).collect();
@@ -75,10 +86,11 @@ pub fn found(
     if !contrasts.is_empty() {
         plain = coarsely(&imager, values, *known)?;
     }
-    let first = events(&imager, plain.marginal.assumed)?;
+    let near = plain.marginal.assumed;
+    let first = events(&imager, values, near)?;
     if asked.fitted.is_empty() {
-        let field = plain.marginal.assumed.into();
-        return Ok(FoundStar { star: None, events: first, drift_kms_d, contrasts, field });
+        let other_rotation = rotation(&imager, values, near, first.as_ref());
+        return Ok(FoundStar { star: None, events: first, drift_kms_d, contrasts, other_rotation, field: near.into() });
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -88,6 +100,8 @@ pub fn found(
     report("fitting active regions");
     let (star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
     star.put_into(&mut imager);
+    let mut values = values;
+    star.set(&mut values, |parameter| !parameter.is_surface());
     if !contrasts.is_empty() && !star.numbers.is_empty() {
         // the line of regions has taken up some of what spots were dark for
         star.put_into(&mut without);
@@ -96,8 +110,9 @@ pub fn found(
         contrasts = fit_contrasts(&mut without, &Fitted::near(marginal), asked.contrasts, &given)?;
         contrasts.iter().zip(asked.contrasts).for_each(|(of, set)| imager.sets[*set].contrast = Some(of.value));
     }
-    let events = if star.numbers.is_empty() { first } else { events(&imager, near)? };
-    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts, field: near.into() })
+    let events = if star.numbers.is_empty() { first } else { events(&imager, values, near)? };
+    let other_rotation = rotation(&imager, values, near, events.as_ref());
+    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts, other_rotation, field: near.into() })
 }
 
 /// The same profiles and field `plain` with drifts held where one is steep, and their slopes (km/s per day); no slopes

@@ -3,7 +3,7 @@
 
 use super::light::misfits;
 use super::linearised::linearised;
-use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, OtherRotation, fit};
+use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
 use crate::field::{Field, Kernel, Lifetime};
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::planets::velocities::VelocityQuadratic;
@@ -82,8 +82,6 @@ impl SurfaceMaps {
                 summary.chi2_per_datum
             ));
         }
-        let other_rotation = OtherRotation::of(imager, values, fitted, known);
-        warnings.extend(other_rotation.iter().map(OtherRotation::sentence));
         let light = marginal.light_curves(imager);
         warnings.extend(misfits(imager, &light));
         let counted = |counted: bool| modelled.estimates.iter().filter(move |_| counted);
@@ -101,7 +99,6 @@ impl SurfaceMaps {
             checks: Checks::of_flexible(&against.residuals, &imager.profiles_of_sets(), imager.data.correlated_bins),
             warnings,
             summary,
-            other_rotation,
             here: Some(here),
         })
     }

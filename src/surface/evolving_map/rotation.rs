@@ -2,10 +2,10 @@
 //!
 //! At a wrong rotation period no map lasts. The lifetime of the spots falls until maps of single nights explain the
 //! profiles, each by itself, and such maps explain planets, too. So where the lifetime is short against what maps need
-//! to agree, other periods are tried with spots that last; where ln Z is highest the field is fitted as it was at the
+//! to agree, other periods are tried with spots that last; where ln Z is highest the field is fitted, as it is at the
 //! period that is given.
 
-use super::fit::{Fitted, fit, share_of_many};
+use super::fit::{fit, share_of_many};
 use super::{Assumed, Basis, Design, Known, Marginal};
 use crate::field::{Field, Kernel, Lifetime};
 use crate::model::{Parameter, ParameterValues};
@@ -53,11 +53,11 @@ pub struct OtherRotation {
 }
 
 impl OtherRotation {
-    /// With which the profiles of `imager` are far more probable than as they are `fitted` at `values`; `None` where
-    /// the spots last, their lifetime is given, or no period is better.
-    pub(super) fn of(imager: &Imager, values: ParameterValues, fitted: &Fitted, known: Known) -> Option<Self> {
+    /// With which the profiles of `imager` are far more probable than with that in `values`, where the field is `near`
+    /// this one; `None` where the spots last, their lifetime is given, or no period is better.
+    pub fn of(imager: &Imager, values: ParameterValues, near: Assumed, known: Known) -> Option<Self> {
         let given_period_d = TAU / values.star.omega_eq_rad_d;
-        let lifetime_d = fitted.marginal.assumed.field.kernel.lifetime.days()?;
+        let lifetime_d = near.field.kernel.lifetime.days()?;
         if known.lifetime.is_some() || lifetime_d > LASTING * given_period_d {
             return None;
         }
@@ -92,14 +92,15 @@ impl OtherRotation {
             highest = peaks(&scan(beside, rotations), closer);
         }
         let rotation_period_d = *highest.first()?;
-        let there = fit(imager, &Basis::new(&imager.grid), turning(rotation_period_d), known, None).ok()?;
+        let fitted = |period_d: f64, start| fit(imager, &basis, turning(period_d), Known { start, ..known }, None).ok();
+        let (here, there) = (fitted(given_period_d, Some(near.into()))?, fitted(rotation_period_d, None)?);
         let found = OtherRotation {
             rotation_period_d,
             given_period_d,
-            ln_evidence_gain: there.ln_evidence - fitted.ln_evidence,
-            spot_lifetime_d: [there.marginal.assumed.field.kernel.lifetime.days()?, lifetime_d],
+            ln_evidence_gain: there.ln_evidence - here.ln_evidence,
+            spot_lifetime_d: [there, here].map(|at| at.marginal.assumed.field.kernel.lifetime.days().unwrap_or(0.0)),
         };
-        (found.ln_evidence_gain > GAIN).then_some(found)
+        (found.ln_evidence_gain > GAIN && found.spot_lifetime_d[0] > 0.0).then_some(found)
     }
 
     /// Whether it is another one by so much that maps with the given one say nothing of velocities.

@@ -1,7 +1,7 @@
 //! The evolving map behind the interface of all surface models.
 
 use super::linearised::linearised;
-use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
+use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, fit, nights, optimum};
 use crate::field::Lifetime;
 use crate::model::{ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
@@ -99,10 +99,6 @@ impl SurfaceModel for EvolvingMap {
     fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>> {
         let known = Some(self.known).filter(|known| known.lifetime == Some(Lifetime::Static));
         known.map(|known| Change::of(at.imager, at.values, frequencies, at.nuisances, known))
-    }
-
-    fn other_rotation(&self, at: At, here: &Linearised) -> Option<OtherRotation> {
-        OtherRotation::of(at.imager, at.values, here.kept(), self.known)
     }
 
     fn imitates_at_fractions(&self) -> bool {

@@ -80,7 +80,6 @@ impl SurfaceMaps {
             light: Vec::new(),
             trade_off: reference.tradeoff.nodes().iter().map(node).collect(),
             field: None,
-            other_rotation: None,
             here: None,
             warnings: Vec::new(),
             summary,
