@@ -140,6 +140,9 @@ impl<'a> Maps<'a> {
     }
 }
 
+/// How a warning begins that a search answers.
+pub const AS_ORBIT: &str = "Spot-corrected RVs vary as on a circular orbit";
+
 /// What the velocities of evolving maps say where no orbit is assumed: as in the blind search of `periodogram`.
 struct FreeVelocities {
     /// The best orbit, and how often stars without a planet show one as good; `None` where the config assumes an orbit.
@@ -188,7 +191,7 @@ impl FreeVelocities {
             kms => format!("; the RV jitter of {kms:.3} km/s absorbs it"),
         };
         Some(format!(
-            "Spot-corrected RVs vary as on a circular orbit ({}, {}){absorbed}: run `dimcmc periodogram {}`.",
+            "{AS_ORBIT} ({}, {}){absorbed}: run `dimcmc periodogram {}`.",
             signal.words(),
             false_alarm(*chance),
             scene.settings.path.display()
@@ -239,12 +242,12 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
             0.0 => String::new(),
             kms => format!(", RV jitter of {kms:.4} km/s included"),
         };
-        lines.push(("RV, no spots", format!("{rms:.4} km/s rms, uncertainty {error:.4} km/s{counted}")));
+        lines.push(("RV corrected", format!("{rms:.4} km/s rms, uncertainty {error:.4} km/s (correlated){counted}")));
     }
     let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
     if !zero_points_kms.is_empty() {
         let squares = zero_points_kms.iter().map(|v| v * v).sum();
-        lines.push(("RV offsets", format!("{:.4} km/s rms", rms(squares, zero_points_kms.len()))));
+        lines.push(("fitted jitter", format!("{:.4} km/s rms", rms(squares, zero_points_kms.len()))));
     }
     if !nuisances.is_empty() {
         let [offset, slope, width] =

@@ -92,12 +92,16 @@ pub(super) fn tone(good: bool) -> Tone {
 }
 
 /// The parameters that are given, and the injected ones where they are known.
-pub(super) fn parameters(values: &ParameterValues, truth: Option<&ParameterValues>) -> Table {
+pub(super) fn parameters(
+    values: &ParameterValues,
+    truth: Option<&ParameterValues>,
+    is_shown: impl Fn(&Parameter) -> bool,
+) -> Table {
     let row = |parameter: Parameter| {
         let mut row = vec![label(parameter.name()), number(values.get(parameter)?, 4)];
         row.extend(truth.map(|truth| number(truth.get(parameter), 4)));
         Some(row)
     };
     let head: &[&str] = if truth.is_some() { &["parameter", "value", "injected"] } else { &["parameter", "value"] };
-    table(head, Parameter::ALL.into_iter().filter_map(row).collect())
+    table(head, Parameter::ALL.into_iter().filter(is_shown).filter_map(row).collect())
 }

@@ -50,7 +50,7 @@ fn digits_of(sigma: Option<f64>, otherwise: usize) -> usize {
 fn simulation(truth: &Truth) -> Chapter {
     let snr = truth.snr.map_or_else(|| "no noise".into(), |snr| format!("{snr}"));
     let rows = [("spot coverage", number(truth.spottedness, 4)), ("signal-to-noise ratio of a bin", snr)];
-    let parameters = parameters(&truth.parameters, None);
+    let parameters = parameters(&truth.parameters, None, |_| true);
     Chapter {
         heading: "Simulation".into(),
         tables: vec![("Simulated data.".into(), pairs(&rows)), ("Injected parameters.".into(), parameters)],

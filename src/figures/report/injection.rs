@@ -32,7 +32,7 @@ pub(super) fn limits(file: &LimitsFile) -> Chapter {
     let k = format!("*K* ({}), 50 %", unit.name);
     let head = ["period (d)", "*P*_{orb}/*P*_{rot}", &k, "95 %"].map(str::to_owned).to_vec();
     let rows = file.limits.iter().step_by(file.limits.len().div_ceil(SHOWN).max(1)).map(row).collect();
-    let diagnostics = vec![("*K* recovered at 50 and 95 % of the phases.".to_owned(), Table { head, rows })];
+    let diagnostics = vec![("K recovered at 50 and 95 % of the phases.".to_owned(), Table { head, rows })];
     let mut tables = Vec::new();
     if let Some(agreement) = &file.agreement {
         let rows = [

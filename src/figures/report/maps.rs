@@ -2,6 +2,7 @@
 
 use super::chapter::{Chapter, Tone, number, pairs, parameters, tone};
 use crate::data::io::map::FitFile;
+use crate::model::Parameter;
 use crate::sampling::log_density::Status;
 use crate::surface::SpotField;
 use crate::surface::maps::ImageSummary;
@@ -47,14 +48,15 @@ pub(super) fn chapter(file: &FitFile) -> Chapter {
         Some(_) => ("Maps", "Spots and fit."),
         None => ("Map", "Fit."),
     };
-    let parameters = parameters(&fit.parameters, file.truth.as_ref());
+    let has_orbit = fit.parameters[Parameter::K] > 0.0 || file.truth.is_some();
+    let parameters = parameters(&fit.parameters, file.truth.as_ref(), |of| has_orbit || !of.is_orbital());
     Chapter {
         heading: heading.into(),
         verdicts: vec![sentence(file)],
         warnings: file.warnings.iter().chain(&file.checks.warnings).cloned().collect(),
         notes,
         tables: vec![(table.into(), pairs(&rows))],
-        diagnostics: vec![("Parameters of star and orbit.".into(), parameters)],
+        diagnostics: vec![("Parameters of the maps.".into(), parameters)],
     }
 }
 

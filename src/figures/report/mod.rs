@@ -18,6 +18,7 @@ mod verdicts;
 use crate::figures::drawing::Figure;
 use crate::figures::plot::{self, PlotError};
 use crate::numerics::text::escaped;
+use crate::runs::maps::AS_ORBIT;
 use chapter::{Chapter, Table};
 use html::{Page, Statement};
 use section::Kind;
@@ -93,6 +94,14 @@ fn same_star(first: &Part, other: &Part) -> Result<(), PlotError> {
     }
 }
 
+/// What warns of the results, but for a planet that maps show where a search says what it is.
+fn warnings(parts: &[Part]) -> Vec<String> {
+    let chapters = || parts.iter().flat_map(|part| &part.chapters);
+    let is_searched = chapters().any(|(kind, _)| *kind == Kind::Periodogram);
+    let is_open = |warning: &&String| !(is_searched && warning.starts_with(AS_ORBIT));
+    unique(chapters().flat_map(|(_, chapter)| &chapter.warnings).filter(is_open).cloned())
+}
+
 /// All that the page shows, of the parts of one star.
 fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
     let config = parts.iter().find_map(Part::config).cloned();
@@ -115,7 +124,7 @@ fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
         parts.iter().filter_map(|part| Some((part.title.as_str(), part.config()?))).collect();
     let mut assumed: Vec<(String, Table)> = Vec::new();
     if let Some(config) = &config {
-        assumed.push(("Fixed values.".into(), assumed::fixed(config)));
+        assumed.push(("Values of the config.".into(), assumed::fixed(config)));
         assumed.push(("Priors of the free parameters.".into(), assumed::priors(config)));
         assumed.push((
             "The folders have different configs; the tables above are of the first.".into(),
@@ -127,9 +136,7 @@ fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
         subject: parts.iter().find_map(lines).unwrap_or_default(),
         turning,
         statements: statements(&parts),
-        warnings: unique(
-            parts.iter().flat_map(|p| &p.chapters).flat_map(|(_, chapter)| chapter.warnings.iter().cloned()),
-        ),
+        warnings: warnings(&parts),
         provenance: parts
             .iter()
             .flat_map(|p| &p.abouts)

@@ -46,11 +46,11 @@ impl Detection {
         match self.co_rotation_penalty {
             Some(ratio) if ratio > 1.1 => {
                 format!(
-                    "At P = P_rot the signal is degenerate with spot modulation: σ_K is {ratio:.1} times its median."
+                    "Sensitivity is lowest at P = P_rot (spot modulation): σ_K is {ratio:.1} times its median there."
                 )
             }
             Some(ratio) => format!("At P = P_rot σ_K is {ratio:.2} times its median."),
-            None => "At P = P_rot the signal is degenerate with spot modulation, and K is unbounded.".to_owned(),
+            None => "At P = P_rot an orbit is degenerate with spot modulation, and K is unbounded there.".to_owned(),
         }
     }
 

@@ -9,7 +9,7 @@ use super::record::{
 use crate::inference::detection::HeldOut;
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
-use crate::planets::verdict::{SIMULATED_FAP, decimals, false_alarm, probability};
+use crate::planets::verdict::{SIMULATED_FAP, decimals, false_alarm, probability, speed};
 use crate::surface::ConstantVelocity;
 
 /// Peaks shown; the file has the others.
@@ -161,17 +161,36 @@ fn robustness(found: &RobustnessRecord) -> String {
         let short = if at.reached { "" } else { " (not reached)" };
         row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
     }));
-    let without = |night: &NightRecord| {
-        let plural = if night.profiles == 1 { "" } else { "s" };
-        format!("without night {:.2}, {} profile{plural}", night.first_time_d, night.profiles)
-    };
-    rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
     let held = found.held_out_nights.map_or_else(String::new, |held| {
         let HeldOut { delta_ln_p, sigma_delta_ln_p, nights } = held;
         let gain = format!("{delta_ln_p:.1} ± {sigma_delta_ln_p:.1}");
-        format!("held-out nights: Δln p = {gain} (planet minus no planet, {nights} nights)\n")
+        format!(
+            "held-out nights, predicted from the others: Δln p = {gain} (planet minus no planet, {nights} nights)\n"
+        )
     });
-    aligned(&rows) + &held
+    let targets = if found.targets.is_empty() { String::new() } else { aligned(&rows) };
+    targets + &without_nights(&found.without_night) + &held
+}
+
+/// How far K and the height of the peak depend on a single night.
+fn without_nights(nights: &[NightRecord]) -> String {
+    let least = |of: fn(&QuickRecord) -> Option<f64>, sign: f64| {
+        let all = nights.iter().filter_map(|night| Some((sign * of(&night.orbit)?, night.first_time_d)));
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(value, time_d)| (sign * value, time_d))
+    };
+    let ends = [1.0, -1.0].map(|sign| least(|orbit| orbit.k_kms, sign));
+    let (Some((low, _)), Some((high, _)), Some((lowest, time_d))) =
+        (ends[0], ends[1], least(|orbit| orbit.delta_ln_l, 1.0))
+    else {
+        return String::new();
+    };
+    let k = |kms: f64| speed(kms, 0.1 * high.abs());
+    format!(
+        "without any one night: K = {} to {}, Δln L ≥ {lowest:.1} (without night {time_d:.2}; {} nights)\n",
+        k(low),
+        k(high),
+        nights.len()
+    )
 }
 
 fn chance(alarm: &FalseAlarmRecord) -> String {
@@ -199,7 +218,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
         let of_period = decimals(peak.orbit.sigma_period_d.unwrap_or(f64::NAN));
         let of_ratio = decimals(peak.orbit.sigma_porb_over_prot.unwrap_or(f64::NAN));
         let note = match &peak.alias {
-            Some(alias) => Some(format!("alias of 1 at {:.3}/d", alias.window_frequency_per_d)),
+            Some(alias) => Some(format!("alias of peak 1 (window peak at {:.3}/d)", alias.window_frequency_per_d)),
             None if on_edge => Some("at the edge".to_owned()),
             None => None,
         };

@@ -9,7 +9,7 @@ use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::Search;
-use crate::planets::verdict::{CANDIDATE_FAP, probability};
+use crate::planets::verdict::{CANDIDATE_FAP, decimals, false_alarm, probability, speed};
 use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -162,17 +162,22 @@ impl LimitsFile {
             rows.push(vec![format!("{period_d:.4}"), format!("{porb_over_prot:.4}"), shown(k50_kms), shown(k95_kms)]);
         }
         let mut text = aligned(&rows);
+        let shown = match step {
+            1 => String::new(),
+            _ => format!("; {} of {} periods, all are in {CSV}", self.limits.len().div_ceil(step), self.limits.len()),
+        };
         text += &format!(
-            "K (km/s) recovered (FAP < {} %, right period) at 50 and 95 % of {} phases\n",
+            "K (km/s) recovered (FAP < {} %, right period) at 50 and 95 % of {} phases{shown}\n",
             100.0 * self.false_alarm_probability,
             self.phases
         );
         if let Some(orbit) = self.removed {
+            let BeforeRecord { period_d, false_alarm_probability, .. } = self.before;
+            let digits = decimals(0.01 * period_d);
             text += &format!(
-                "subtracted first: candidate at P = {:.4} d, K = {:.4} km/s (FAP {})\n",
-                self.before.period_d,
-                -orbit.k_kms,
-                probability(self.before.false_alarm_probability)
+                "subtracted first: signal of P = {period_d:.digits$} d, K = {} ({})\n",
+                speed(-orbit.k_kms, 0.1 * orbit.k_kms.abs()),
+                false_alarm(false_alarm_probability)
             );
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) = self.agreement {

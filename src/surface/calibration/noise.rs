@@ -251,7 +251,7 @@ impl MeasuredErrors {
                 1.0 => String::new(),
                 bins => format!(", noise correlation length {bins} bins"),
             };
-            line = format!("rescaled by {scale} ({line}{residual}{together})");
+            line = format!("rescaled by {scale} ({line} of the quoted uncertainty{residual}{together})");
         }
         let extreme = |f: fn(f64, f64) -> f64| self.profiles.iter().copied().reduce(f).unwrap_or(1.0);
         if !self.profiles.is_empty() {

@@ -191,9 +191,10 @@ impl MeasuredStar {
     pub fn line(&self) -> String {
         let MeasuredStar { numbers, mean_profile, gain, .. } = self;
         if numbers.is_empty() {
-            let why = if *gain < NEEDED { "" } else { ", too little for values so far from their priors" };
+            let why = if *gain < NEEDED { "" } else { ", less than values so far from their priors cost" };
             return format!(
-                "as in the config, regions with the photosphere's line (a fit gains Δln Z = {gain:.1}{why})"
+                "star as in the config, active regions with the photosphere's line (fitting both gains Δln Z = \
+                {gain:.1}{why})"
             );
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
