@@ -89,7 +89,7 @@ impl EvidenceRecord {
             let ends = cycles.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
             let time_base_d = rotation_period_d * (ends[1] - ends[0]);
             let digits = decimals(0.5 * best.period_d.powi(2) / time_base_d);
-            format!("; false inclusion probability {chance} at P = {:.digits$} d, by these priors", best.period_d)
+            format!("; false inclusion probability {chance} at P = {:.digits$} d", best.period_d)
         });
         let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
             let most = one.k.1[1];
@@ -100,7 +100,7 @@ impl EvidenceRecord {
         });
         let jitter = if !jitters.is_none() { ", RV jitter marginalised" } else { "" };
         let sentence = format!(
-            "{}ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (priors: \
+            "{}ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (not used in the verdict; priors: \
             {priors}; spots fixed at the planet-free fit{jitter})",
             wide.unwrap_or_default(),
             number(&circle),
