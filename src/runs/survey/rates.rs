@@ -1,0 +1,54 @@
+//! The rates of a sample: of each box, among all stars and among those of each group.
+
+use super::boxes::PlanetBox;
+use super::file::{RateRecord, SignalRecord};
+use super::star::Star;
+use crate::planets::occurrence::{Member, RatePosterior, RatePrior};
+
+/// Of all stars first, then of the groups in the order in which they are met, box after box.
+pub fn rates(stars: &[Star], boxes: &[PlanetBox], prior: RatePrior) -> Vec<RateRecord> {
+    let mut groups: Vec<Option<&str>> = vec![None];
+    for group in stars.iter().filter_map(|star| star.group.as_deref()) {
+        if !groups.contains(&Some(group)) {
+            groups.push(Some(group));
+        }
+    }
+    let mut records = Vec::new();
+    for (number, planets) in boxes.iter().enumerate() {
+        for group in &groups {
+            let counted = stars.iter().filter(|star| star.left_out().is_none());
+            let of_group = counted.filter(|star| group.is_none_or(|group| star.group.as_deref() == Some(group)));
+            let members: Vec<(&Star, Member)> = of_group.map(|star| (star, star.member(planets))).collect();
+            records.push(rate((number + 1, *group), &members, prior));
+        }
+    }
+    records
+}
+
+fn rate((number, group): (usize, Option<&str>), stars: &[(&Star, Member)], prior: RatePrior) -> RateRecord {
+    let members: Vec<Member> = stars.iter().map(|(_, member)| *member).collect();
+    let posterior = RatePosterior::of(&members, prior);
+    let signal = |(star, member): &(&Star, Member)| {
+        let share = member.signal?.share;
+        Some(SignalRecord { name: star.name.clone(), share, reliability: share * posterior.reliability(member) })
+    };
+    let (rate, density) = posterior.density(prior);
+    let most_likely = posterior.most_likely();
+    RateRecord {
+        planets: number,
+        group: group.map(str::to_owned),
+        stars: members.len(),
+        effective_stars: members.iter().map(|member| member.completeness).sum(),
+        detections: members.iter().filter_map(|member| member.signal).map(|signal| signal.share).sum(),
+        false_alarms: members.iter().map(|member| member.false_alarm).sum(),
+        signals: stars.iter().filter_map(signal).collect(),
+        most_likely,
+        median: posterior.quantile(0.5),
+        mean: posterior.mean(),
+        ci68: posterior.interval(0.68),
+        ci95: posterior.interval(0.95),
+        upper95: (most_likely == 0.0).then(|| posterior.quantile(0.95)),
+        rate,
+        density,
+    }
+}
