@@ -189,7 +189,7 @@ def main():
     if options.write is not None:
         return write_sample(random.Random(options.seed), options.write, options.stars, 0.1)
     head = "true rate | in 68 % (expected) | in 95 % (expected) | median - truth (%) | effective stars | signals"
-    print(f"| {head} | false alarms |")
+    print(f"| {head} | false positives |")
     print("|---|---|---|---|---|---|---|")
     with ThreadPoolExecutor(2) as pool:
         for rate in (0.0, 0.1, 0.3, None):

@@ -3,7 +3,7 @@
 
 use super::SurveySettings;
 use super::boxes::{PlanetBox, Size};
-use super::rates::rates;
+use super::rates::{RateRecord, rates};
 use super::star::Star;
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::{Table, quoted};
@@ -88,53 +88,6 @@ pub struct StarRecord {
     pub completeness: Vec<f64>,
     /// Chance of a false alarm in each box.
     pub false_alarms: Vec<f64>,
-}
-
-/// The rate of planets in a box.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct RateRecord {
-    /// Number of the box, from 1.
-    #[serde(rename = "box")]
-    pub planets: usize,
-    /// The group; null of all stars.
-    pub group: Option<String>,
-    /// Number of stars.
-    pub stars: usize,
-    /// Sum of their completeness.
-    pub effective_stars: f64,
-    /// Signals in the box, each with its share.
-    pub detections: f64,
-    /// False alarms expected there, if no star has a planet.
-    pub false_alarms: f64,
-    /// Those signals.
-    pub signals: Vec<SignalRecord>,
-    /// The rate of highest likelihood.
-    pub most_likely: f64,
-    /// Median of the posterior.
-    pub median: f64,
-    /// Mean of the posterior.
-    pub mean: f64,
-    /// Credible interval of highest likelihood.
-    pub ci68: [f64; 2],
-    /// The same at 95 %.
-    pub ci95: [f64; 2],
-    /// 95 % upper limit, where the likelihood is highest at 0.
-    pub upper95: Option<f64>,
-    /// Rates.
-    pub rate: Vec<f64>,
-    /// Density of the posterior at them.
-    pub density: Vec<f64>,
-}
-
-/// A signal in a box.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SignalRecord {
-    /// Of which star.
-    pub name: String,
-    /// Probability that its orbit is in the box.
-    pub share: f64,
-    /// Probability that it is a planet of the box, by the rate and by chance.
-    pub reliability: f64,
 }
 
 impl BoxRecord {
@@ -251,7 +204,7 @@ impl SurveyFile {
                 "number",
                 "effective",
                 "detections",
-                "false alarms",
+                "by chance",
                 "rate (%)",
                 "68 % interval",
                 "95 % interval",

@@ -12,8 +12,9 @@ mod star;
 mod table;
 
 pub use boxes::{PlanetBox, Size};
-pub use file::{BoxRecord, COMPLETENESS, CSV, JSON, RateRecord, StarRecord, SurveyFile};
+pub use file::{BoxRecord, COMPLETENESS, CSV, JSON, StarRecord, SurveyFile};
 pub use folders::SurveyError;
+pub use rates::{RateRecord, SignalRecord};
 pub use table::StarTable;
 
 use crate::data::io::atomic::WriteError;

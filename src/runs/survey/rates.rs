@@ -1,9 +1,56 @@
 //! The rates of a sample: of each box, among all stars and among those of each group.
 
 use super::boxes::PlanetBox;
-use super::file::{RateRecord, SignalRecord};
 use super::star::Star;
 use crate::planets::occurrence::{Member, RatePosterior, RatePrior};
+use serde::{Deserialize, Serialize};
+
+/// The rate of planets in a box.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RateRecord {
+    /// Number of the box, from 1.
+    #[serde(rename = "box")]
+    pub planets: usize,
+    /// The group; null of all stars.
+    pub group: Option<String>,
+    /// Number of stars.
+    pub stars: usize,
+    /// Sum of their completeness.
+    pub effective_stars: f64,
+    /// Signals in the box, each with its share.
+    pub detections: f64,
+    /// False alarms expected there, if no star has a planet.
+    pub false_alarms: f64,
+    /// Those signals.
+    pub signals: Vec<SignalRecord>,
+    /// The rate of highest likelihood.
+    pub most_likely: f64,
+    /// Median of the posterior.
+    pub median: f64,
+    /// Mean of the posterior.
+    pub mean: f64,
+    /// Credible interval of highest likelihood.
+    pub ci68: [f64; 2],
+    /// The same at 95 %.
+    pub ci95: [f64; 2],
+    /// 95 % upper limit, where the likelihood is highest at 0.
+    pub upper95: Option<f64>,
+    /// Rates.
+    pub rate: Vec<f64>,
+    /// Density of the posterior at them.
+    pub density: Vec<f64>,
+}
+
+/// A signal in a box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SignalRecord {
+    /// Of which star.
+    pub name: String,
+    /// Probability that its orbit is in the box.
+    pub share: f64,
+    /// Probability that it is a planet of the box, by the rate and by chance.
+    pub reliability: f64,
+}
 
 /// Of all stars first, then of the groups in the order in which they are met, box after box.
 pub fn rates(stars: &[Star], boxes: &[PlanetBox], prior: RatePrior) -> Vec<RateRecord> {
