@@ -90,7 +90,7 @@ class Star:
         folder.mkdir(parents=True)
         periods = even(*SEARCHED_D, PERIODS)
         lowest = min(self.k50_kms(p) for p in periods)
-        amplitudes = even(lowest / 3.0, 40.0 * lowest, AMPLITUDES)
+        amplitudes = even(lowest / 3.0, 15.0 * lowest, AMPLITUDES)
         period_d, k_kms, p = self.search(rng, planet)
         own = {
             "version": "simulated",

@@ -192,7 +192,7 @@ const COLUMNS: usize = 2;
 fn rates(file: &SurveyFile) -> Figure {
     let boxes = file.boxes.len().max(1);
     let (columns, rows) = (boxes.min(COLUMNS), boxes.div_ceil(COLUMNS));
-    let (left, top, gap, below) = (40.0, 18.0, 44.0, 46.0);
+    let (left, top, gap, below) = (40.0, 18.0, 44.0, 34.0);
     let height = if columns == 1 { 150.0 } else { 120.0 };
     let mut figure = Figure::new("rates", PAGE_MM, rows as f64 * (height + top + below) / 72.0 * 25.4);
     figure.caption = RATES.into();

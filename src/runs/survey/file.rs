@@ -25,6 +25,11 @@ pub const JSON: &str = "survey.json";
 /// Periods (d) at which limits are quoted, as columns of `survey.csv` name them.
 const QUOTED: [(f64, &str); 3] = [(1.0, "k95_kms_1d"), (3.0, "k95_kms_3d"), (10.0, "k95_kms_10d")];
 
+/// Why completeness is lower than it could be.
+const NOT_SEARCHED: &str = "not all periods were searched; completeness is 0 at the others";
+const NOT_INJECTED: &str = "planets smaller than those injected would be found, and count as missed; repeat \
+                            `dimcmc limits` with a smaller --min-k-kms";
+
 /// Periods, and semi-amplitudes or masses, of `completeness.csv`.
 const PERIODS: usize = 40;
 const SIZES: usize = 30;
@@ -137,14 +142,15 @@ impl SurveyFile {
             let own = star.left_out().map(str::to_owned).into_iter().chain(star.warnings.iter().cloned());
             warnings.extend(own.map(|warning| format!("{}: {warning}", star.name)));
         }
-        for planets in boxes {
-            let of =
-                |star: &Star| star.doubts(planets).into_iter().map(|doubt| format!("{}: {doubt}", star.name)).collect();
-            warnings.extend(
-                stars.iter().filter(|star| star.left_out().is_none()).flat_map(|star| -> Vec<String> { of(star) }),
-            );
+        for (k, planets) in boxes.iter().enumerate() {
+            let of = |is: &dyn Fn(&Star) -> bool, problem: &str| {
+                let counted = stars.iter().filter(|star| star.left_out().is_none());
+                let names: Vec<&str> = counted.filter(|star| is(star)).map(|star| star.name.as_str()).collect();
+                (!names.is_empty()).then(|| format!("box {}: {problem}: {}", k + 1, names.join(", ")))
+            };
+            warnings.extend(of(&|star| !star.covers_periods(planets), NOT_SEARCHED));
+            warnings.extend(of(&|star| star.finds_smaller(planets), NOT_INJECTED));
         }
-        warnings.dedup();
         SurveyFile {
             prior: *prior,
             false_alarm_probability: stars.first().map_or(f64::NAN, |star| star.limits.false_alarm_probability),
@@ -226,7 +232,13 @@ impl SurveyFile {
         head.push("completeness".into());
         let or_none = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
         let row = |star: &StarRecord| {
-            let mut cells = vec![escaped(&star.name).into_owned(), finding(star.finding).to_owned()];
+            let verdict = match star.finding {
+                Finding::NoPlanetNeeded => "no signal",
+                Finding::Candidate => "candidate",
+                Finding::Detection => "detection",
+                Finding::NotJudged => "no verdict",
+            };
+            let mut cells = vec![escaped(&star.name).into_owned(), verdict.to_owned()];
             cells.push(star.false_alarm_probability.map_or_else(|| "-".to_owned(), probability));
             cells.extend([or_none(star.period_d, 3), or_none(star.k_kms, 3)]);
             cells.extend(star.k95_kms.iter().map(|k| or_none(*k, 3)));

@@ -85,9 +85,9 @@ fn rate((number, group): (usize, Option<&str>), stars: &[(&Star, Member)], prior
         planets: number,
         group: group.map(str::to_owned),
         stars: members.len(),
-        effective_stars: members.iter().map(|member| member.completeness).sum(),
-        detections: members.iter().filter_map(|member| member.signal).map(|signal| signal.share).sum(),
-        false_alarms: members.iter().map(|member| member.false_alarm).sum(),
+        effective_stars: total(members.iter().map(|member| member.completeness)),
+        detections: total(members.iter().filter_map(|member| member.signal).map(|signal| signal.share)),
+        false_alarms: total(members.iter().map(|member| member.false_alarm)),
         signals: stars.iter().filter_map(signal).collect(),
         most_likely,
         median: posterior.quantile(0.5),
@@ -98,4 +98,9 @@ fn rate((number, group): (usize, Option<&str>), stars: &[(&Star, Member)], prior
         rate,
         density,
     }
+}
+
+/// Their sum; 0 of none, where that of the standard library is -0.
+fn total(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.fold(0.0, |sum, x| sum + x)
 }

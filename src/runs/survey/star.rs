@@ -101,25 +101,17 @@ impl Star {
         }
     }
 
-    /// What has to be known of it and of a box.
-    pub fn doubts(&self, planets: &PlanetBox) -> Vec<String> {
-        let [shortest, longest] = self.searched_d();
-        let mut doubts = Vec::new();
-        // periods that are round and ends of a search that are not
-        if planets.periods_d[0] < shortest / 1.01 || planets.periods_d[1] > longest * 1.01 {
-            doubts.push(format!(
-                "searched from {shortest:.3} to {longest:.3} d only: other periods of the box have completeness 0"
-            ));
-        }
-        let smallest = self.limits.k_kms.first().copied().unwrap_or(f64::INFINITY);
+    /// Whether the search covers the periods of a box, all but a twentieth of their logarithm.
+    pub fn covers_periods(&self, planets: &PlanetBox) -> bool {
+        let ([shortest, longest], [first, last]) = (self.searched_d(), planets.periods_d);
+        let covered = (longest.min(last) / shortest.max(first)).ln();
+        covered > 0.95 * (last / first).ln()
+    }
+
+    /// Whether planets of a box that are smaller than those injected would be found: they count as missed.
+    pub fn finds_smaller(&self, planets: &PlanetBox) -> bool {
+        let smallest = self.limits.k_kms.first().copied().unwrap_or_default();
         let least = planets.k_kms(planets.periods_d[1], planets.sizes[0], self.mass_msun);
-        if least < smallest && self.completeness.at_smallest_k() > 0.1 {
-            doubts.push(format!(
-                "completeness is {:.0} % at the smallest K injected ({smallest:.4} km/s) and taken as 0 below: repeat \
-                `dimcmc limits` with a smaller --min-k-kms",
-                100.0 * self.completeness.at_smallest_k()
-            ));
-        }
-        doubts
+        least < smallest && self.completeness.at_smallest_k() > 0.1
     }
 }
