@@ -57,9 +57,9 @@ impl Completeness {
         along(i) + u * (along(i + 1) - along(i))
     }
 
-    /// The largest of the fractions at the smallest K: above 0 what lies below is underestimated.
+    /// Mean of the fractions at the smallest K: above 0 what lies below is underestimated.
     pub fn at_smallest_k(&self) -> f64 {
-        self.recovered.iter().step_by(self.ln_k.len()).fold(0.0, |largest, fraction| f64::max(largest, *fraction))
+        self.recovered.iter().step_by(self.ln_k.len()).sum::<f64>() / self.ln_periods.len() as f64
     }
 
     /// Mean over a box, planets evenly in the logarithms of period and size; `k_kms` of a period (d) and size.

@@ -96,7 +96,9 @@ fn map(file: &SurveyFile, table: &Columns, size: Size) -> Result<Option<Figure>,
         file.stars.iter().filter_map(|star| signal(file, star, size)).collect();
     let ends = |of: &[f64], step: f64, also: &mut dyn Iterator<Item = f64>| {
         let whole = [of[0] / step, of[of.len() - 1] * step];
-        also.filter(|x| *x > 0.0).fold(whole, |[low, high], x| [low.min(x / 1.2), high.max(1.2 * x)])
+        // a signal beyond what was injected is shown, too
+        let beyond = also.filter(|x| *x > 0.0 && !(whole[0]..=whole[1]).contains(x));
+        beyond.fold(whole, |[low, high], x| [low.min(x / 1.2), high.max(1.2 * x)])
     };
     let periods = ends(&sum.periods, across, &mut found.iter().map(|(_, at, _)| at[0]));
     let sizes = ends(&sum.sizes, up, &mut found.iter().map(|(_, at, _)| at[1])).map(|x| factor * x);
@@ -206,7 +208,8 @@ fn rates(file: &SurveyFile) -> Figure {
         };
         let of_box: Vec<&RateRecord> = file.rates.iter().filter(|rate| rate.planets == k + 1).collect();
         posterior(&mut figure, frame, &of_box);
-        let words = planets.planets().words().replace("M_Jup", "*M*_{Jup}");
+        let words = planets.planets().words().replace("M_Jup", "*M*_{Jup}").replace("M sin i", "*M* sin *i*");
+        let words = words.replace("P ", "*P* ").replace("K ", "*K* ");
         figure.text(&words, [frame.centre()[0], frame.top - 5.0], Font::SMALL, Align::Centre, 0.0);
     }
     figure
@@ -226,10 +229,12 @@ fn posterior(figure: &mut Figure, frame: Rect, rates: &[&RateRecord]) {
         inside(rate).iter().filter(|[x, _]| *x > 0.01 * range[1]).map(|[_, y]| *y).fold(0.0, f64::max)
     };
     let highest = rates.iter().map(|rate| height(rate)).fold(0.0, f64::max);
+    // above all curves, for the legend
+    let room = 1.1 + 12.0 * rates.len() as f64 / frame.height;
     let panel = Panel {
         frame,
         x: Axis::linear("stars with a planet (%)", range),
-        y: Axis::linear("probability density (1/%)", [0.0, if highest > 0.0 { 1.12 * highest } else { 1.0 }]),
+        y: Axis::linear("probability density (1/%)", [0.0, room * if highest > 0.0 { highest } else { 1.0 }]),
     };
     let mut legend = Legend::default();
     for (k, rate) in rates.iter().enumerate() {

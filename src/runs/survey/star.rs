@@ -112,6 +112,6 @@ impl Star {
     pub fn finds_smaller(&self, planets: &PlanetBox) -> bool {
         let smallest = self.limits.k_kms.first().copied().unwrap_or_default();
         let least = planets.k_kms(planets.periods_d[1], planets.sizes[0], self.mass_msun);
-        least < smallest && self.completeness.at_smallest_k() > 0.1
+        least < smallest && self.completeness.at_smallest_k() > 0.05
     }
 }
