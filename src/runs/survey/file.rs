@@ -175,7 +175,8 @@ impl SurveyFile {
         let then = ["sigma_k_kms", "msini_mjup", "mass_msun"];
         let names: Vec<&str> = first.into_iter().chain(then).chain(QUOTED.map(|(_, name)| name)).collect();
         let mut table = Table::new(&[&names[..], &["completeness"]].concat());
-        let number = |x: Option<f64>| x.map_or_else(String::new, |x| x.to_string());
+        // tiny FAPs with an exponent
+        let number = |x: Option<f64>| x.map_or_else(String::new, |x| format!("{x:?}"));
         for star in &self.stars {
             let words = [
                 quoted(&star.name),
