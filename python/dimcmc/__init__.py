@@ -20,6 +20,7 @@ A config says which star, which profiles and which parameters are free; the func
 `optimise`          the best parameters and their error bars
 `grid`              a likelihood grid and its paraboloid
 `sample`            the posterior; a `Run`, also of the command line
+`survey`            the rate of planets in a sample of stars
 `report`            one HTML page of a star
 `open`              any folder of results, also of the command line
 `LogPosterior`      the same density for emcee, zeus, dynesty, nautilus
@@ -31,7 +32,7 @@ converted to these.
 
 from ._config import Config, Section
 from ._core import __version__
-from ._folders import Batch, open, report
+from ._folders import Batch, open, report, survey
 from ._functions import grid, inject, limits, map, optimise, periodogram, plan, sample, simulate
 from ._init import init
 from ._observations import Observations
@@ -49,6 +50,7 @@ from ._results import (
     Record,
     Result,
     Simulation,
+    Survey,
 )
 from ._run import Run
 
@@ -71,6 +73,7 @@ __all__ = [
     "Run",
     "Section",
     "Simulation",
+    "Survey",
     "__version__",
     "grid",
     "init",
@@ -84,4 +87,5 @@ __all__ = [
     "report",
     "sample",
     "simulate",
+    "survey",
 ]

@@ -77,6 +77,12 @@ def plan(
     out: str,
     manner: _Manner,
 ) -> str: ...
+def survey(
+    folders: Sequence[str],
+    options: tuple[list[str], list[str], bool, str | None, str | None, str | None],
+    out: str,
+    manner: _Manner,
+) -> str: ...
 def optimise(config: _Config, observations: _Arrays | None, out: str, manner: _Manner) -> str: ...
 def grid(
     config: _Config,

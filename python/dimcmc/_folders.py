@@ -6,8 +6,11 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from . import _core
+from ._functions import _by_keyword, _folder, _threads
+from ._progress import shown
 from ._results import (
     Comparison,
     Grid,
@@ -20,10 +23,11 @@ from ._results import (
     Record,
     Result,
     Simulation,
+    Survey,
 )
 from ._run import Run
 
-__all__ = ["Batch", "open", "report"]
+__all__ = ["Batch", "open", "report", "survey"]
 
 
 class Batch(Result):
@@ -61,6 +65,7 @@ _KINDS: tuple[type[Result], ...] = (
     Periodogram,
     Limits,
     Plan,
+    Survey,
     Optimum,
     Comparison,
     Batch,
@@ -76,7 +81,7 @@ def open(folder: str | os.PathLike[str]) -> Result:
     ----------
     folder : str or path
         What `simulate`, `inject`, `map`, `periodogram`, `limits`, `plan`, `optimise`, `grid`, `sample`, `merge`,
-        `compare` or `batch` wrote into.
+        `compare`, `batch` or `survey` wrote into.
 
     Returns
     -------
@@ -171,3 +176,78 @@ def report(
     finally:
         begun.unlink(missing_ok=True)
     return file
+
+
+def survey(
+    results: Result | str | os.PathLike[str] | Sequence[Result | str | os.PathLike[str]],
+    *,
+    boxes: Sequence[tuple[tuple[float, float], tuple[float, float]]] = (),
+    mass_boxes: Sequence[tuple[tuple[float, float], tuple[float, float]]] = (),
+    table: str | os.PathLike[str] | None = None,
+    group: str | None = None,
+    reliability: str | None = None,
+    prior: Literal["uniform", "jeffreys"] = "uniform",
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Survey:
+    """Completeness of a sample of stars, and the rate of planets in it.
+
+    Each star has a search (`periodogram`, `sample`) and detection limits (`limits`); results of the same observations
+    belong to one star.
+
+    Parameters
+    ----------
+    results : Result, str, path, or a list of these
+        Searches and limits, or folders that hold them, at any depth up to 4.
+    boxes : sequence of ((shortest, longest), (smallest, largest))
+        Planets whose rate is estimated, by period (d) and K (km/s); by default ((1, 10), (0.05, 1)).
+    mass_boxes : sequence of ((shortest, longest), (smallest, largest))
+        The same by period (d) and M sin i (Jupiter masses); needs ``star.mass_msun`` of every star.
+    table : str or path, optional
+        Table of the stars (CSV), their names in the column ``name`` or ``star``, or in the first.
+    group : str, optional
+        Column of the table: estimate the rate in each group, too.
+    reliability : str, optional
+        Column of the table: probability that the signal of a star is a planet, chance aside.
+    prior : {"uniform", "jeffreys"}
+        Prior of each rate.
+    out : str or path, optional
+        Folder for the files; by default a temporary one, deleted with the result.
+    force : bool
+        Write into a non-empty folder.
+    threads : int, optional
+        Number of threads; all processors by default. Results do not depend on it.
+    progress : bool, optional
+        Show progress; by default in notebooks and on terminals.
+
+    Returns
+    -------
+    Survey
+
+    Raises
+    ------
+    ValueError
+        A star without search or limits; the message names all of them.
+
+    Examples
+    --------
+    >>> found = dimcmc.survey("runs/stars", boxes=[((1, 10), (0.05, 1.0))])      # doctest: +SKIP
+    >>> found.rates[0].ci95                                                      # doctest: +SKIP
+    [0.0, 0.12]
+    """
+    if prior not in ("uniform", "jeffreys"):
+        raise ValueError(f'prior: must be "uniform" or "jeffreys", not {prior!r}')
+    if table is None and (group is not None or reliability is not None):
+        raise ValueError("table: name the table that has the columns group and reliability")
+    several = [results] if isinstance(results, (Result, str, os.PathLike)) else list(results)
+    if not several:
+        raise ValueError("results: give one at least")
+    folders = [os.fspath(one.folder if isinstance(one, Result) else one) for one in several]
+    texts = [[f"{p[0]}:{p[1]},{s[0]}:{s[1]}" for p, s in some] for some in (boxes, mass_boxes)]
+    path = None if table is None else os.fspath(table)
+    options = (texts[0], texts[1], prior == "jeffreys", path, group, reliability)
+    with _folder(out, force) as (folder, scratch), shown("survey", progress) as show, _by_keyword():
+        said = _core.survey(folders, options, os.fspath(folder), (_threads(threads), show))
+    return Survey(folder, said, scratch)

@@ -25,6 +25,8 @@ _TABLES = {
     "lightcurve": "lightcurve.csv",
     "limits": "limits.csv",
     "plan": "plan.csv",
+    "completeness": "completeness.csv",
+    "completeness_mass": "completeness.csv",
 }
 _MAPS = ("map", "maps", "maps_mollweide")
 _CHAIN = ("traces", "autocorrelation")
@@ -51,6 +53,8 @@ def arrays(result: Result, name: str) -> Arrays:
     if name == "landscape":
         axes: Arrays = getattr(result, "axes")
         return {**axes, "log_likelihood": getattr(result, "log_likelihood")}
+    if name == "rates":
+        return _rates_arrays(result)
     if name == "optimum":
         best = result._json("optimum.json")
         values = [np.array([best[key][of] for of in best.names]) for key in ("parameters", "sd")]
@@ -109,6 +113,12 @@ def _painter(name: str, numbers: Arrays) -> tuple[_Painter, int, int]:
         return _limits, 1, 1
     if name == "residuals":
         return _residuals, 1, 3
+    if name == "completeness":
+        return _completeness, 1, 1
+    if name == "completeness_mass":
+        return _completeness_mass, 1, 1
+    if name == "rates":
+        return _rates, 1, max(int(key.split("_")[1]) for key in numbers)
     if name in _MAPS or name.startswith("map_"):
         count = len(_values(numbers))
         columns = min(count, 3)
@@ -239,6 +249,58 @@ def _limits(result: Result, numbers: Arrays, axes: Any) -> None:
         period_d, k = removed.porb_over_prot * rotation, 1e3 * abs(removed.k_kms)
         panel.plot(period_d, k, "D", color="C0", markeredgecolor="white")
     panel.set(xscale="log", yscale="log", xlabel="period (d)", ylabel="K (m/s)")
+
+
+def _completeness(result: Result, numbers: Arrays, axes: Any) -> None:
+    _completeness_by(result, numbers, axes[0, 0], "k_kms", 1e3, "K (m/s)")
+
+
+def _completeness_mass(result: Result, numbers: Arrays, axes: Any) -> None:
+    _completeness_by(result, numbers, axes[0, 0], "msini_mjup", 1.0, "M sin i ($M_{Jup}$)")
+
+
+def _completeness_by(result: Result, numbers: Arrays, panel: Any, size: str, factor: float, label: str) -> None:
+    """Completeness of all stars by period and size, with the signals found."""
+    content = result._json("survey.json")
+    # the sum over stars is star 0: by K without a mass, by mass without K
+    other = "msini_mjup" if size == "k_kms" else "k_kms"
+    rows = (numbers["star"] == 0) & np.isnan(numbers[other])
+    periods, sizes = np.unique(numbers["period_d"][rows]), np.unique(numbers[size][rows])
+    stars = sum(star.counted for star in content.stars)
+    grid = 100.0 / stars * numbers["completeness"][rows].reshape(len(periods), len(sizes)).T
+    mesh = panel.pcolormesh(periods, factor * sizes, grid, cmap="cividis", vmin=0, vmax=100, shading="nearest")
+    panel.figure.colorbar(mesh, ax=panel, label=f"completeness (% of {stars} stars)")
+    for planets in content.boxes:
+        if planets[size] is not None:
+            (p1, p2), (s1, s2) = planets.period_d, (factor * edge for edge in planets[size])
+            panel.plot([p1, p2, p2, p1, p1], [s1, s1, s2, s2, s1], color="C9")
+    for star in content.stars:
+        found = star.false_alarm_probability is not None
+        if star.counted and found and star.false_alarm_probability < content.false_alarm_probability:
+            panel.plot(star.period_d, factor * star[size], "D", color="C3", markeredgecolor="white")
+    panel.set(xscale="log", yscale="log", xlabel="period (d)", ylabel=label)
+
+
+def _rates_arrays(result: Result) -> Arrays:
+    """Rates and densities of each posterior, by the number of its box and its group."""
+    found: Arrays = {}
+    for rate in result._json("survey.json").rates:
+        key = f"box_{rate.box}_{'all' if rate.group is None else rate.group}"
+        found[f"{key}_rate"], found[f"{key}_density"] = np.array(rate.rate), np.array(rate.density)
+    return found
+
+
+def _rates(result: Result, numbers: Arrays, axes: Any) -> None:
+    for rate in result._json("survey.json").rates:
+        panel = axes[0, rate.box - 1]
+        label = f"{'all' if rate.group is None else rate.group}, {rate.stars} stars"
+        line = panel.plot(100.0 * np.array(rate.rate), 0.01 * np.array(rate.density), label=label)
+        low, high = (100.0 * edge for edge in rate.ci68)
+        panel.axvspan(low, high, color=line[0].get_color(), alpha=0.2)
+        # those of all stars come first
+        end = max(0.0 if rate.group is None else panel.get_xlim()[1], 135.0 * rate.ci95[1])
+        panel.set(xlim=(0.0, min(100.0, end)), xlabel="stars with a planet (%)", ylabel="probability density (1/%)")
+        panel.legend()
 
 
 def _residuals(result: Result, numbers: Arrays, axes: Any) -> None:

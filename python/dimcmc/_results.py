@@ -34,6 +34,7 @@ __all__ = [
     "Record",
     "Result",
     "Simulation",
+    "Survey",
 ]
 
 _R = TypeVar("_R", bound="Result")
@@ -587,6 +588,32 @@ class Plan(Result):
     def periods(self) -> dict[str, NDArray[np.float64]]:
         """Uncertainty of K and detectable K (km/s) at every period, for each schedule: the columns of `plan.csv`."""
         return self._table("plan.csv")
+
+
+class Survey(Result):
+    """Completeness of a sample of stars, and the rate of planets in it, from `survey`."""
+
+    _FILE = "survey.json"
+
+    @property
+    def summary(self) -> Record:
+        """Boxes, stars, rates with their posteriors, warnings (`survey.json`)."""
+        return self._json("survey.json")
+
+    @property
+    def stars(self) -> list[Record]:
+        """Verdict, limits and completeness of each star."""
+        return list(self.summary.stars)
+
+    @property
+    def rates(self) -> list[Record]:
+        """The rate of planets in each box, of all stars first, then of each group."""
+        return list(self.summary.rates)
+
+    @property
+    def completeness(self) -> dict[str, NDArray[np.float64]]:
+        """Fraction recovered by period and size: the columns of `completeness.csv`; star 0 is the sum over stars."""
+        return self._table("completeness.csv")
 
 
 class Optimum(Result):

@@ -5,8 +5,8 @@ use crate::job::{Job, attend, soon};
 use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
 use dimcmc::{
     BestOrbit, BlindSearch, BlindSearchOptions, DetectionLimits, Failure, Figure, Forecast, Format, FrequencySettings,
-    GridScan, Injected, LimitsOptions, LimitsProgress, Maps, OptimumFile, Orbit, ParaboloidRule, PlanSettings, Pool,
-    Scene, Simulated,
+    GridScan, Injected, LimitsOptions, LimitsProgress, Maps, OptimumFile, Orbit, ParaboloidRule, PlanSettings,
+    PlanetBox, Pool, RatePrior, Scene, Simulated, Size, StarTable, Survey, SurveySettings,
 };
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -327,6 +327,45 @@ pub fn optimise(
         create(job, out)?;
         file.write(out)?;
         Ok(file.table().trim_end().to_owned())
+    })
+}
+
+/// Options of `survey`: boxes by K and by M sin i as on the command line, whether the prior is that of Jeffreys; table,
+/// column of groups, column of reliabilities.
+type SurveyOptions = (Vec<String>, Vec<String>, bool, Option<PathBuf>, Option<String>, Option<String>);
+
+/// `dimcmc survey`.
+#[pyfunction]
+pub fn survey(
+    py: Python,
+    folders: Vec<PathBuf>,
+    options: SurveyOptions,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let (boxes, mass_boxes, jeffreys, table, group, reliability) = options;
+    let of = |texts: Vec<String>, size: Size, name: &str| {
+        let of_text = |text: &String| {
+            let wrong = |problem| PyValueError::new_err(format!("{name}: {text}: {problem}"));
+            PlanetBox::from_text(text, size).map_err(wrong)
+        };
+        texts.iter().map(of_text).collect::<PyResult<Vec<_>>>()
+    };
+    let boxes = [of(boxes, Size::Amplitude, "boxes")?, of(mass_boxes, Size::Mass, "mass_boxes")?].concat();
+    let mut settings = SurveySettings {
+        prior: if jeffreys { RatePrior::Jeffreys } else { RatePrior::Uniform },
+        table: table.map(|path| StarTable { path, group, reliability }),
+        ..SurveySettings::default()
+    };
+    if !boxes.is_empty() {
+        settings.boxes = boxes;
+    }
+    attend(py, manner.0, manner.1, move |job| {
+        job.say("reading");
+        let survey = Survey::of(&folders, &settings)?;
+        create(job, &out)?;
+        survey.write(&out).map_err(Fault::from)?;
+        Ok(survey.table().trim_end().to_owned())
     })
 }
 

@@ -41,6 +41,7 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
         wrap_pyfunction!(calls::printed, module)?,
         wrap_pyfunction!(calls::plan, module)?,
         wrap_pyfunction!(calls::optimise, module)?,
+        wrap_pyfunction!(calls::survey, module)?,
         wrap_pyfunction!(run::sample, module)?,
         wrap_pyfunction!(run::read_run, module)?,
         wrap_pyfunction!(run::is_false_start, module)?,

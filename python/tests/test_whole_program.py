@@ -255,6 +255,32 @@ def test_what_the_command_line_wrote_opens(run: dimcmc.Run, grid: dimcmc.Grid, t
     assert "star: " in str(stars) and stars._repr_html_()
 
 
+def test_rates_are_those_of_the_command_line(limits: dimcmc.Limits, tmp_path: Path) -> None:
+    search = dimcmc.periodogram(SMALL, draws=1000, out=tmp_path / "search")
+    (tmp_path / "stars.csv").write_text("name,age\nsearch,young\n")
+    box = ((0.5, 5.0), (0.05, 1.0))
+    table = tmp_path / "stars.csv"
+    found = dimcmc.survey([search, limits], boxes=[box], table=table, group="age", out=tmp_path / "survey")
+    options = ["--box", "0.5:5.0,0.05:1.0", "--table", table, "--group", "age", "--out", "theirs"]
+    printed = command("survey", search.folder, limits.folder, *options, cwd=tmp_path)
+    assert str(found) in printed
+    theirs = files(tmp_path / "theirs")
+    for name in ["survey.csv", "completeness.csv", "survey.json"]:
+        assert theirs[name] == files(found.folder)[name], name
+    assert [rate.group for rate in found.rates] == [None, "young"] and found.stars[0].finding == "detection"
+    assert 0.0 < found.rates[0].effective_stars < 1.0
+    assert set(np.unique(found.completeness["star"])) == {0.0, 1.0}
+    assert found.figures == ["completeness", "rates"]
+    assert type(dimcmc.open(found.folder)) is dimcmc.Survey and str(dimcmc.open(found.folder)) == str(found)
+    assert "box_1_young_density" in found.figure_data("rates")
+    with pytest.raises(ValueError, match="no limits of 1 of 1 stars: search: run `dimcmc limits"):
+        dimcmc.survey(search)
+    with pytest.raises(ValueError, match="boxes: 5:1,0.1:1"):
+        dimcmc.survey([search, limits], boxes=[((5, 1), (0.1, 1))])
+    with pytest.raises(ValueError, match="table: name the table"):
+        dimcmc.survey([search, limits], group="age")
+
+
 def test_several_data_sets_open(tmp_path: Path) -> None:
     observed = SMALL["observations"]["simulate"]
     second = {key: observed[key] for key in ("cycles", "velocity_kms", "snr")}

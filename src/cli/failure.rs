@@ -23,6 +23,7 @@ use crate::runs::origin::OriginError;
 use crate::runs::plan::{CampaignError, ForecastError, PlanError};
 use crate::runs::run::RunError;
 use crate::runs::simulated::SimulateError;
+use crate::runs::survey::SurveyError;
 use crate::surface::ReferenceError;
 use crate::surface::record::RebuildError;
 use crate::surface::{NoMaps, SurfaceError};
@@ -266,6 +267,12 @@ impl From<ExportError> for Failure {
 
 impl From<PairError> for Failure {
     fn from(error: PairError) -> Self {
+        Failure::of(error)
+    }
+}
+
+impl From<SurveyError> for Failure {
+    fn from(error: SurveyError) -> Self {
         Failure::of(error)
     }
 }

@@ -6,7 +6,7 @@ use clap::Command;
 const GROUPS: &[(&str, &[&str])] = &[
     ("Begin", &["init", "import", "plan", "simulate", "inject"]),
     ("Image and search", &["map", "periodogram", "limits", "optimise", "grid"]),
-    ("Sample", &["sample", "analyse", "compare", "merge", "batch"]),
+    ("Sample", &["sample", "analyse", "compare", "merge", "batch", "survey"]),
     ("Show and pass on", &["plot", "report", "export"]),
     ("This program", &["schema", "completions", "man", "help"]),
 ];

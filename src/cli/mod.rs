@@ -34,6 +34,7 @@ mod schema;
 mod search;
 pub mod signals;
 mod simulate;
+mod survey;
 
 pub use failure::Failure;
 pub use init::first_config;
@@ -97,6 +98,7 @@ enum Command {
     Compare(compare::Args),
     Merge(merge::Args),
     Batch(batch::Args),
+    Survey(survey::Args),
     Export(export::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -156,6 +158,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Compare(args) => compare::run(args, &cli.global),
         Command::Merge(args) => merge::run(args, &cli.global),
         Command::Batch(args) => batch::run(args, &cli.global),
+        Command::Survey(args) => survey::run(args),
         Command::Export(args) => export::run(args, &cli.global),
         Command::Schema(args) => schema::run(args),
         Command::Completions(args) => completions::run(args),

@@ -2,7 +2,7 @@
 
 use super::plot::PlotError;
 use crate::runs::grid_scan::{self, GridScanError};
-use crate::runs::{blind_search, comparison, limits, optimum, origin, plan};
+use crate::runs::{blind_search, comparison, limits, optimum, origin, plan, survey};
 use std::path::Path;
 
 /// What was printed when `file` was written into `folder`; `None` where the file does not hold all of it.
@@ -15,6 +15,7 @@ pub fn printed(folder: &Path, file: &str) -> Result<Option<String>, PlotError> {
         limits::JSON => origin::read::<limits::LimitsFile>(folder, limits::JSON)?.table(),
         plan::JSON => origin::read::<plan::PlanFile>(folder, plan::JSON)?.table(),
         optimum::FILE => origin::read::<optimum::OptimumFile>(folder, optimum::FILE)?.table(),
+        survey::JSON => origin::read::<survey::SurveyFile>(folder, survey::JSON)?.table(),
         comparison::FILE => origin::read::<comparison::Comparison>(folder, comparison::FILE)?.table(),
         grid_scan::HEADER => grid_scan::printed(folder).map_err(|error| match error {
             GridScanError::Origin(error) => PlotError::Origin(error),

@@ -7,13 +7,14 @@
 //! searched for on request.
 //!
 //! [`evidence`] has Bayes factors of models with and without planets; [`mixture`], K where several orbits may be true;
-//! [`modes`], the periods of a posterior.
+//! [`modes`], the periods of a posterior; [`occurrence`], the rate of planets in a sample of stars.
 //!
 //! The thresholds (false-alarm probabilities of candidate and detection among them) are constants of [`verdict`].
 
 pub mod evidence;
 pub mod mixture;
 pub mod modes;
+pub mod occurrence;
 pub mod periodogram;
 pub mod velocities;
 pub mod verdict;

@@ -9,7 +9,7 @@
 //!    [`detection_limits`] carries out the latter, [`injected`] puts an orbit into profiles, [`plan`] is what profiles
 //!    not yet taken would show. [`log_posterior`] is the density of a chain for other samplers.
 //! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] compares a chain with a
-//!    landscape.
+//!    landscape. [`survey`] has the rate of planets in a sample.
 //! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
 //!    `export/mod.rs`.
 
@@ -34,3 +34,4 @@ pub mod plan;
 pub mod pool;
 pub mod run;
 pub mod simulated;
+pub mod survey;

@@ -60,7 +60,7 @@ pub struct OptimumRecord {
 }
 
 /// Files by which the folder of a command is known.
-const KINDS: [(&str, &str); 10] = [
+const KINDS: [(&str, &str); 11] = [
     ("manifest.json", "sample"),
     ("periodogram.json", "periodogram"),
     ("limits.json", "limits"),
@@ -70,6 +70,7 @@ const KINDS: [(&str, &str); 10] = [
     ("map.json", "map"),
     ("plan.json", "plan"),
     ("batch.json", "batch"),
+    ("survey.json", "survey"),
     ("truth.json", "simulate"),
 ];
 

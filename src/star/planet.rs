@@ -58,6 +58,14 @@ pub fn minimum_mass(k_kms: f64, period_d: f64, mass_msun: f64) -> MinimumMass {
     MinimumMass { mjup, by_k: k_kms.signum() * 3.0 * mjup / (k * share), by_period: mjup / (period_d * share) }
 }
 
+/// The semi-amplitude (km/s) of a circular orbit with the minimum mass `mjup` (Jupiter masses): the inverse of
+/// [`minimum_mass`].
+pub fn amplitude_kms(mjup: f64, period_d: f64, mass_msun: f64) -> f64 {
+    let per_third = (period_d * SECONDS_PER_DAY / (TAU * SOLAR_GM_KM3_S2)).cbrt();
+    let x = mjup / JUPITERS_PER_SUN;
+    x / (per_third * (mass_msun + x).powf(2.0 / 3.0))
+}
+
 /// Phase (orbital cycles) of the largest radial velocity of a circular orbit: phi, or opposite to it for an amplitude
 /// below zero.
 pub fn maximum_phase(orbit: &Orbit) -> f64 {
@@ -126,6 +134,7 @@ mod tests {
             assert!(((by(h, 0.0) - by(-h, 0.0)) / (2.0 * h) / found.by_k - 1.0).abs() < 1e-6);
             assert!(((by(0.0, 1e-4) - by(0.0, -1e-4)) / 2e-4 / found.by_period - 1.0).abs() < 1e-6);
             assert_eq!(minimum_mass(-k, period_d, star).by_k, -found.by_k);
+            assert!((amplitude_kms(found.mjup, period_d, star) / k - 1.0).abs() < 1e-12);
         }
         let nothing = minimum_mass(0.0, 3.0, 1.0);
         assert!((nothing.by_k / (minimum_mass(1e-9, 3.0, 1.0).mjup / 1e-9) - 1.0).abs() < 1e-6 && nothing.mjup == 0.0);

@@ -37,4 +37,5 @@ mod sample;
 mod shared;
 mod stopped;
 mod story;
+mod survey;
 mod zero_points;

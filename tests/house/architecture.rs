@@ -13,7 +13,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("field", &[], &["numerics"]),
     (
         "planets",
-        &["mixture", "velocities", "verdict", "periodogram", "modes", "evidence"],
+        &["mixture", "velocities", "verdict", "periodogram", "modes", "evidence", "occurrence"],
         &["numerics", "star::kepler"],
     ),
     ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics"]),
@@ -52,6 +52,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "export",
             "merge",
             "batch",
+            "survey",
         ],
         &["numerics", "star", "maxent", "field", "planets", "sampling", "model", "surface", "inference", "data"],
     ),

@@ -26,6 +26,7 @@ const ORDER: &[&str] = &[
     "sample",
     "merge",
     "batch",
+    "survey",
     "analyse",
     "compare",
     "plot",

@@ -97,6 +97,90 @@ impl Columns {
     }
 }
 
+/// A table of words that was read, such as a catalogue of stars.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Words {
+    path: PathBuf,
+    names: Vec<String>,
+    rows: Vec<Vec<String>>,
+    /// The line that each row stands in.
+    lines: Vec<usize>,
+}
+
+impl Words {
+    /// Reads a table with the names of its columns in the first line. Cells may stand in quotes.
+    ///
+    /// # Errors
+    /// [`FileError`]: a file that cannot be read, a line of another length, no row.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+        let names = lines.next().map(|(_, line)| cells(line)).unwrap_or_default();
+        let mut table = Words { path: path.into(), names, rows: Vec::new(), lines: Vec::new() };
+        for (k, line) in lines {
+            let row = cells(line);
+            if row.len() != table.names.len() {
+                let problem = format!("{} columns instead of {}", row.len(), table.names.len());
+                return Err(FileError::Line { path: path.into(), line: k + 1, problem });
+            }
+            table.rows.push(row);
+            table.lines.push(k + 1);
+        }
+        if table.rows.is_empty() { Err(FileError::of(path, "the table has no row")) } else { Ok(table) }
+    }
+
+    /// Whether there is a column of that name.
+    pub fn has(&self, name: &str) -> bool {
+        self.names.iter().any(|one| one == name)
+    }
+
+    /// Name of the first column.
+    pub fn first(&self) -> &str {
+        self.names.first().map_or("", String::as_str)
+    }
+
+    /// The line of the file that a row stands in.
+    pub fn line(&self, row: usize) -> usize {
+        self.lines[row]
+    }
+
+    /// The cells of a column.
+    ///
+    /// # Errors
+    /// [`FileError::File`] if there is none of that name.
+    pub fn column(&self, name: &str) -> Result<Vec<&str>, FileError> {
+        let missing =
+            || FileError::of(&self.path, format!("no column {name}; the columns are {}", self.names.join(", ")));
+        let k = self.names.iter().position(|one| one == name).ok_or_else(missing)?;
+        Ok(self.rows.iter().map(|row| row[k].as_str()).collect())
+    }
+}
+
+/// The cells of a line; a quote within quotes is doubled.
+fn cells(line: &str) -> Vec<String> {
+    let (mut cells, mut inside) = (vec![String::new()], false);
+    let mut characters = line.chars().peekable();
+    while let Some(c) = characters.next() {
+        let cell = cells.last_mut().expect("never empty");
+        match c {
+            '"' if inside && characters.peek() == Some(&'"') => {
+                characters.next();
+                cell.push('"');
+            }
+            '"' => inside = !inside,
+            ',' if !inside => cells.push(String::new()),
+            _ => cell.push(c),
+        }
+    }
+    cells.iter().map(|cell| cell.trim().to_owned()).collect()
+}
+
+/// A word as a cell: in quotes where it holds a comma, a quote or the end of a line.
+pub fn quoted(word: &str) -> String {
+    if word.contains([',', '"', '\n', '\r']) { format!("\"{}\"", word.replace('"', "\"\"")) } else { word.to_owned() }
+}
+
 /// A table under construction.
 #[derive(Clone, Debug)]
 pub struct Table {
@@ -131,5 +215,12 @@ impl Table {
     /// The text.
     pub fn into_bytes(self) -> Vec<u8> {
         self.text.into_bytes()
+    }
+}
+
+#[test]
+fn words_are_read_as_they_are_written() {
+    for word in ["AB Dor", "a, b", "the \"star\"", ""] {
+        assert_eq!(cells(&format!("1,{},2", quoted(word))), ["1", word, "2"]);
     }
 }

@@ -1,7 +1,7 @@
 //! Figures of what a folder holds, from its files alone; nothing is computed anew.
 //!
 //! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
-//! `plan`, `optimise`, `grid`, `sample` and `compare`.
+//! `plan`, `optimise`, `grid`, `sample`, `compare` and `survey`.
 
 mod changes;
 mod comparison;
@@ -23,6 +23,7 @@ mod profiles;
 mod projection;
 mod star_map;
 mod surface;
+mod survey;
 pub mod symbols;
 mod times;
 mod trace;
@@ -92,11 +93,12 @@ const ANY: [f64; 2] = [-1e12, 1e12];
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
 /// The files by which a folder is known, with what draws it.
-const KINDS: [(&str, Draw); 9] = [
+const KINDS: [(&str, Draw); 10] = [
     (MAP, star_map_figures),
     (blind_search::FILE, |folder, _| periodogram::figures(folder)),
     (runs::limits::JSON, |folder, _| limits::figures(folder)),
     (runs::plan::JSON, |folder, _| plan::figures(folder)),
+    (runs::survey::JSON, |folder, _| survey::figures(folder)),
     (manifest::FILE, |folder, _| chain_figures(folder)),
     (grid_scan::HEADER, landscape::figures),
     (runs::optimum::FILE, |folder, _| optimum::figures(folder)),
