@@ -80,10 +80,18 @@ impl Journal {
 /// # Errors
 /// [`JournalError::Io`]; [`JournalError::Line`] for anything wrong but a torn tail.
 pub fn read(path: &Path, shape: &Shape) -> Result<Chain, JournalError> {
+    Ok(read_to_end(path, shape)?.0)
+}
+
+/// The same, and whether the file ends with a whole step.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_to_end(path: &Path, shape: &Shape) -> Result<(Chain, bool), JournalError> {
     check_names(shape)?;
     let mut reader = StepReader::new(shape);
-    lines::read(path, &mut |line| reader.take(line))?;
-    Ok(reader.chain)
+    let is_whole = lines::read(path, &mut |line| reader.take(line))?;
+    Ok((reader.chain, is_whole))
 }
 
 /// Gathers lines into whole steps.

@@ -5,7 +5,7 @@
 //! is wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn
 //! tail. While a process writes such a file it holds a lock on it.
 
-use super::atomic;
+use super::atomic::{self, WriteError};
 use serde::Serialize;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
@@ -60,6 +60,15 @@ pub(super) struct Refusal {
     problem: String,
     /// Whether it may be what an interruption left of a line.
     torn: bool,
+}
+
+impl From<JournalError> for WriteError {
+    fn from(error: JournalError) -> Self {
+        match error {
+            JournalError::Io { path, source } => WriteError { path, source },
+            error => WriteError { path: PathBuf::new(), source: std::io::Error::other(error) },
+        }
+    }
 }
 
 impl From<serde_json::Error> for Refusal {
@@ -154,10 +163,24 @@ impl LineFile {
     }
 }
 
-/// Hands the lines of a file to `take` and leaves it alone; it may be being written meanwhile.
-pub(super) fn read(path: &Path, take: TakeLine) -> Result<(), JournalError> {
+/// Hands the lines of a file to `take` and leaves it alone; it may be being written meanwhile. Whether it ends with a
+/// whole block.
+pub(super) fn read(path: &Path, take: TakeLine) -> Result<bool, JournalError> {
     let file = File::open(path).map_err(at(path))?;
-    scan(&mut BufReader::new(file), path, take).map(drop)
+    let whole = scan(&mut BufReader::new(&file), path, take)?;
+    Ok(file.metadata().is_ok_and(|file| file.len() == whole))
+}
+
+/// Locks a file against others that would write it, until it is dropped; `None` where there is no such file.
+///
+/// # Errors
+/// [`JournalError::Locked`]: another process writes it; [`JournalError::Io`].
+pub fn hold(path: &Path) -> Result<Option<File>, JournalError> {
+    match OpenOptions::new().read(true).write(true).open(path) {
+        Ok(file) => lock(&file, path).map(|()| Some(file)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(at(path)(error)),
+    }
 }
 
 /// The byte after the last whole block.

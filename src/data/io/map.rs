@@ -5,7 +5,7 @@ mod light;
 
 pub use light::LIGHT_CURVES;
 
-use super::atomic::{WriteError, write, write_json};
+use super::atomic::{WriteError, write, write_json, write_set};
 use super::csv::{DATA_SET, Table};
 use super::provenance::{MeasuredSet, Provenance, Season};
 use crate::maxent::entropy::Entropy;
@@ -224,6 +224,10 @@ impl MapResult<'_> {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_set(folder, &|stage| self.fill(stage))
+    }
+
+    fn fill(&self, folder: &Path) -> Result<(), WriteError> {
         let [map, profiles, rv, fit] = FILES.map(|name| folder.join(name));
         write_json(&map, &self.map())?;
         write(&profiles, &self.profiles().into_bytes())?;

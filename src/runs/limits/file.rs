@@ -4,7 +4,7 @@
 use super::cells::{Cell, Limit, Orbits};
 use super::full::{Agreement, Comparison};
 use super::shortcut::Shortcut;
-use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::numerics::text::aligned;
@@ -148,8 +148,11 @@ impl LimitsFile {
             let counts = [cell.phases, cell.detected, cell.recovered].map(|n| n as f64);
             table.row(&[&[period_d, cell.porb_over_prot, cell.k_kms][..], &counts].concat());
         }
-        write(&folder.join(CSV), &table.into_bytes())?;
-        write_json(&folder.join(JSON), self)
+        let table = table.into_bytes();
+        write_set(folder, &|stage| {
+            write(&stage.join(CSV), &table)?;
+            write_json(&stage.join(JSON), self)
+        })
     }
 
     /// A table of some of the periods, and what may be wrong.

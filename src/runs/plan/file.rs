@@ -1,7 +1,7 @@
 //! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
 
 use super::{Campaign, Expected, Outlook, PlanSettings, SpotsSource};
-use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::numerics::text::{aligned, escaped};
@@ -159,8 +159,11 @@ impl PlanFile {
                 table.row(&[&[(k + 1) as f64, period_d, porb_over_prot][..], &numbers].concat());
             }
         }
-        write(&folder.join(CSV), &table.into_bytes())?;
-        write_json(&folder.join(JSON), self)
+        let table = table.into_bytes();
+        write_set(folder, &|stage| {
+            write(&stage.join(CSV), &table)?;
+            write_json(&stage.join(JSON), self)
+        })
     }
 
     /// The best schedule.
