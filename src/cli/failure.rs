@@ -135,6 +135,7 @@ impl Failure {
             ForecastError::Campaign(error @ CampaignError::Nights { .. }) => Failure::input(error.to_string()),
             ForecastError::TooFewTimes { .. } => Failure::input(error.to_string()),
             ForecastError::Plan(PlanError::Frequencies(error)) => Failure::of(error),
+            ForecastError::Plan(error @ PlanError::TooLong { .. }) => Failure::input(error.to_string()),
             error => Failure::failed(error),
         }
     }

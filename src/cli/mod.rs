@@ -140,14 +140,17 @@ fn misused(error: &clap::Error) -> u8 {
 fn in_one_line(text: &str) -> String {
     let (said, usage) = text.split_once("\n\nUsage: ").unwrap_or((text, ""));
     let said = said.split("\n\nFor more").next().unwrap_or_default().trim().trim_start_matches("error: ");
-    let parts: Vec<String> = said.split("\n\n").map(|part| {
-        let lines: Vec<&str> = part.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-        let head = lines.first().copied().unwrap_or_default();
-        match lines.len() {
-            0 | 1 => head.to_owned(),
-            _ => format!("{head} {}", lines[1..].join(", ")),
-        }
-    }).collect();
+    let parts: Vec<String> = said
+        .split("\n\n")
+        .map(|part| {
+            let lines: Vec<&str> = part.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+            let head = lines.first().copied().unwrap_or_default();
+            match lines.len() {
+                0 | 1 => head.to_owned(),
+                _ => format!("{head} {}", lines[1..].join(", ")),
+            }
+        })
+        .collect();
     let command: Vec<&str> = usage.split_whitespace().take_while(|word| !word.starts_with(['[', '<', '-'])).collect();
     let help = if command.is_empty() { "dimcmc".to_owned() } else { command.join(" ") };
     format!("{}; see {help} --help", parts.join("; "))

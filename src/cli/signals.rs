@@ -7,8 +7,8 @@ use super::failure::{INTERRUPTED, RESUME};
 use super::{Failure, console};
 use signal_hook::consts::SIGINT;
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What commands have not come to whose results are written in one go.
 pub const RESULT: &str = "result";

@@ -9,6 +9,7 @@ pub use conclusions::RunSummary;
 
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
+use crate::data::io::saved::Saved;
 use crate::model::{
     Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, definition, in_earths,
 };
@@ -62,6 +63,8 @@ pub struct Manifest {
 fn posterior_numbers() -> Vec<String> {
     [SPOTTEDNESS, CHI2].map(str::to_owned).to_vec()
 }
+
+impl Saved for Manifest {}
 
 impl Manifest {
     /// What a reader of the chain must know beside it, one line each.

@@ -260,10 +260,10 @@ mod tests {
             write(&stage.join("absent/b"), b"new")
         });
         assert_eq!(failing.unwrap_err().path, dir.path().join("absent/b"));
-        assert_eq!((names(dir.path()), std::fs::read_to_string(dir.path().join("a")).unwrap()), (
-            vec!["a".to_owned()],
-            "old".to_owned()
-        ));
+        assert_eq!(
+            (names(dir.path()), std::fs::read_to_string(dir.path().join("a")).unwrap()),
+            (vec!["a".to_owned()], "old".to_owned())
+        );
         write_set(dir.path(), &|stage| {
             std::fs::create_dir(stage.join("below")).unwrap();
             write(&stage.join("a"), b"new")?;
@@ -301,9 +301,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("store");
         for text in ["one", "two"] {
-            let fill = |folder: &Path| {
-                std::fs::create_dir_all(folder).and_then(|()| std::fs::write(folder.join(text), text))
-            };
+            let fill =
+                |folder: &Path| std::fs::create_dir_all(folder).and_then(|()| std::fs::write(folder.join(text), text));
             write_folder(&path, &fill).unwrap();
             assert_eq!(names(&path), [text]);
         }

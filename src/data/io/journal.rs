@@ -1,6 +1,6 @@
 //! The journal: `chain.jsonl`, one line per step, ensemble and walker, appended by whole steps.
 
-use super::lines::{self, LineFile, Refusal};
+use super::lines::{self, Claim, LineFile, Refusal};
 use crate::sampling::chain::{Chain, ChainError, MoveKind, Record, Shape};
 use crate::sampling::log_density::Status;
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, Visitor};
@@ -40,6 +40,15 @@ impl Journal {
     pub fn create(path: &Path, shape: Shape, replace: bool) -> Result<Self, JournalError> {
         check_names(&shape)?;
         Ok(Journal { file: LineFile::create(path, replace)?, shape, lines: 0 })
+    }
+
+    /// The same where its place was claimed before.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`], [`JournalError::Name`].
+    pub fn begin(claim: Claim, shape: Shape) -> Result<Self, JournalError> {
+        check_names(&shape)?;
+        Ok(Journal { file: claim.begin()?, shape, lines: 0 })
     }
 
     /// Opens a journal to go on with it: reads the complete steps, and cuts the file after them.

@@ -7,6 +7,7 @@ use super::shortcut::Shortcut;
 use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
+use crate::data::io::saved::Saved;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::Search;
 use crate::planets::verdict::{CANDIDATE_FAP, probability};
@@ -51,6 +52,19 @@ pub struct LimitsFile {
     /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+impl Saved for LimitsFile {
+    fn check(&self) -> Result<(), String> {
+        match () {
+            () if self.limits.is_empty() => Err("limits: empty, one period at least is due".into()),
+            () if self.k_kms.is_empty() || self.k_kms.iter().any(|k| *k <= 0.0) => {
+                Err("k_kms: must be above 0, one at least".into())
+            }
+            () if self.phases == 0 => Err("phases: must be above 0".into()),
+            () => Ok(()),
+        }
+    }
 }
 
 /// The highest peak.

@@ -16,7 +16,7 @@ use crate::data::config::Settings;
 use crate::data::io::atomic::clear_abandoned;
 use crate::data::io::effort::Effort;
 use crate::data::io::journal::{self, Journal, JournalError};
-use crate::data::io::lines;
+use crate::data::io::lines::{self, Claim};
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::runs::blind_search::{BlindSearch, SearchSummary};
@@ -213,9 +213,27 @@ impl Run {
     /// A folder that holds a run already or cannot be written.
     #[doc(hidden)]
     pub fn kept_in(self, folder: &Path, replace: bool) -> Result<Self, RunError> {
-        std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
+        self.kept_by(Run::claim(folder, replace)?, folder)
+    }
+
+    /// Claims `folder`, which is made, for a run that is yet to be found: others are refused from now on.
+    ///
+    /// # Errors
+    /// A folder that holds a run already (unless `replace`), in which another process begins one, or that cannot be
+    /// written.
+    #[doc(hidden)]
+    pub fn claim(folder: &Path, replace: bool) -> Result<Claim, RunError> {
+        Ok(Claim::of(&folder.join(CHAIN), replace)?)
+    }
+
+    /// As [`Run::kept_in`], in the folder of a claim.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    #[doc(hidden)]
+    pub fn kept_by(self, claim: Claim, folder: &Path) -> Result<Self, RunError> {
         // the chain first: whoever holds it may write the manifest
-        let mut journal = Journal::create(&folder.join(CHAIN), self.manifest.shape(), replace)?;
+        let mut journal = Journal::begin(claim, self.manifest.shape())?;
         match std::fs::remove_file(folder.join(SUMMARY)) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(RunError::Folder { path: folder.join(SUMMARY), source });

@@ -65,7 +65,9 @@ pub fn write(folder: &Path, out: &Path, replace: bool) -> Result<Vec<PathBuf>, E
         (COVARIANCE, velocities.covariance_m2s2()),
         (LIKELIHOOD, include_str!("rv_likelihood.py").to_owned()),
     ];
-    write_set(out, &|stage| files.iter().try_for_each(|(name, text)| atomic::write(&stage.join(name), text.as_bytes())))?;
+    write_set(out, &|stage| {
+        files.iter().try_for_each(|(name, text)| atomic::write(&stage.join(name), text.as_bytes()))
+    })?;
     Ok(files.iter().map(|(name, _)| out.join(name)).collect())
 }
 
@@ -149,7 +151,10 @@ fn positive(covariance: &DMatrix<f64>) -> Result<(), (usize, String)> {
     let cure = "is this file as `dimcmc periodogram` wrote it? Run the search again";
     for k in 0..covariance.nrows() {
         if variance(k) <= 0.0 {
-            return Err((k + 1, format!("the variance of velocity {} is {:e}, not above 0: {cure}", k + 1, variance(k))));
+            return Err((
+                k + 1,
+                format!("the variance of velocity {} is {:e}, not above 0: {cure}", k + 1, variance(k)),
+            ));
         }
         let far = |j: &usize| {
             let scale = (variance(k) * variance(*j)).sqrt();
