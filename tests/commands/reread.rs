@@ -54,6 +54,7 @@ fn a_plan_whose_best_is_none_of_its_schedules_is_refused() {
     let desk = Desk::new(tiny(2));
     let mut config = tiny(2);
     config["imaging"] = json!({ "objective": "marginal-likelihood", "pixels": 100, "spot_lifetime_d": 20.0 });
+    config["sampler"]["walkers"] = json!(16);
     desk.write("plan.json", &config.to_string());
     desk.succeed(&["plan", "plan.json", "--nights", "4,12", "--maps", "0", "--draws", "1000", "--out", "plan"]);
     let plan = desk.json("plan/plan.json");

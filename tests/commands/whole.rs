@@ -19,6 +19,7 @@ fn slow() -> Value {
 fn plan() -> Value {
     let mut config = tiny(2);
     config["imaging"] = json!({ "objective": "marginal-likelihood", "pixels": 300, "spot_lifetime_d": 20.0 });
+    config["sampler"]["walkers"] = json!(16);
     let cycles: Vec<f64> = (0..300).map(|k| 0.313 * f64::from(k)).collect();
     config["observations"]["simulate"]["cycles"] = json!(cycles);
     config
