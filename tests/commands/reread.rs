@@ -200,7 +200,7 @@ fn one_bad_number_is_named_by_file_and_row() {
     desk.write("data/tess.csv", &with_line(&table, 5, &format!("{row},1e-9")));
     says(
         &desk.refusal(&["map", "star.json", "--out", "x"]),
-        &["data/tess.csv:5: sigma: 1e-9", "outweigh", "Correct it"],
+        &["data/tess.csv:5: sigma: \"1e-9\"", "outweigh", "Correct it"],
     );
     desk.write("data/tess.csv", &table);
     let profile = desk.read("data/red/p002.prof");

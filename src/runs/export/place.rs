@@ -39,7 +39,7 @@ pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> b
     Ok(())
 }
 
-/// Whether the folder can be written: it is not there yet, or empty, or it `is_own` and `replace`. Another folder is not
+/// Whether the folder can be written: it is not there yet, or empty, or it `is_own` and `replace`. Another one is not
 /// replaced, whatever the user says.
 pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
     clear_abandoned(folder);
