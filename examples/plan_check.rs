@@ -48,7 +48,7 @@ const LIFETIME_D: f64 = 12.0;
 fn forecast(campaign: &Campaign, assumed: Assumed, range: [f64; 2], per_cycle: &[f64], maps: usize) -> Vec<f64> {
     let campaign = Campaign { assumed, ..campaign.clone() };
     let settings = PlanSettings { maps, draws: 1000, seed: 1, fixed: false };
-    let outlooks = outlook(&campaign, range, &settings).expect("an outlook");
+    let outlooks = outlook(&campaign, range, &settings, &|_| ()).expect("an outlook");
     let whole: &Outlook = outlooks.last().expect("all nights");
     whole.at(per_cycle).iter().map(|expected| expected.sigma_k_kms.unwrap_or(f64::NAN)).collect()
 }

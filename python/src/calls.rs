@@ -235,7 +235,10 @@ pub fn grid(
             let found = found.map_err(|error| Failure::search(scene.path(), error))?;
             job.say("start images for distant nodes");
             create(job, &out)?;
-            GridScan::begin(&scene, plan, found, &out, replace).map_err(failed)?
+            {
+                let claim = GridScan::claim(&out, replace).map_err(failed)?;
+                GridScan::begin(&scene, plan, found, &out, claim).map_err(failed)?
+            }
         };
         let total = scan.landscape.grid().len();
         let pool = Pool::threads(job.stop());

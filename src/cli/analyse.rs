@@ -1,9 +1,9 @@
 //! `dimcmc analyse`: credible intervals and convergence of a run.
 
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console};
-use crate::data::io::journal;
 use crate::runs::manifest::Manifest;
-use crate::runs::run::{CHAIN, Conclusion};
+use crate::runs::run::{Conclusion, read_chain};
 use crate::sampling::chain::Chain;
 use std::path::{Path, PathBuf};
 
@@ -20,8 +20,9 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let _signals = Signals::catch(RESULT)?;
     let manifest = Manifest::read(&args.run).map_err(Failure::of)?;
-    let chain = journal::read(&args.run.join(CHAIN), &manifest.shape())?;
+    let chain = read_chain(&args.run, &manifest)?;
     report(&args.run, &manifest, &chain)
 }
 

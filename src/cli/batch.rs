@@ -5,8 +5,9 @@ use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::config::Config;
 use crate::data::io::atomic::write_json;
+use crate::data::io::lines::{self, JournalError};
 use crate::numerics::text::{Align, columns, escaped, shown};
-use crate::runs::batch::{End, FILE, Row, read_list, rows, sample_all};
+use crate::runs::batch::{End, FILE, LOCK, Row, read_list, rows, sample_all};
 use crate::sampling::chain::ParameterSummary;
 use std::path::PathBuf;
 
@@ -34,6 +35,12 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     note_objective(&to_begin.filter_map(|star| Config::load(&star.config).ok()).collect::<Vec<_>>());
     let output = Output::to(args.folder.clone(), true);
     let folder = output.create()?;
+    let held = lines::hold_for(&folder.join(LOCK)).map_err(|error| match error {
+        JournalError::Locked { .. } => {
+            Failure::failed(format!("--out {}: another `dimcmc batch` is at work there", folder.display()))
+        }
+        error => error.into(),
+    })?;
     let pool = cluster::pool(global, &signals);
     signals.defer();
     let bar = progress::bar(global, Some(stars.len() as u64), "stars");
@@ -41,6 +48,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     bar.finish_and_clear();
     let rows = rows(&stars, &ends);
     write_json(&folder.join(FILE), &rows)?;
+    let _ = std::fs::remove_file(folder.join(LOCK));
+    drop(held);
     console::line(format_args!("{}written: {}: {FILE}", table(&rows), shown(folder)));
     let count = |is: &dyn Fn(&End) -> bool| ends.iter().filter(|end| is(end)).count();
     let (interrupted, failed) = (count(&|end| *end == End::Interrupted), count(&|end| matches!(end, End::Failed(_))));

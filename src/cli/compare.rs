@@ -1,6 +1,7 @@
 //! `dimcmc compare`: a chain against a landscape.
 
 use super::output::Output;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console};
 use crate::data::io::atomic::write_json;
 use crate::data::io::paraboloid;
@@ -28,11 +29,13 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let pair = Pair::read(&args.run, &args.grid)?;
     let rule = paraboloid::rule(&args.grid.join(PARABOLOID));
     let comparison =
         Comparison::of(&pair, rule).map_err(|e| Failure::input(format!("{}: {e}", args.run.join(CHAIN).display())))?;
+    signals.defer();
     let folder = args.output.create()?;
     write_json(&folder.join(FILE), &comparison)?;
     console::line(format_args!("{}written: {}: {FILE}", comparison.table(), shown(folder)));

@@ -1,5 +1,6 @@
 //! `dimcmc export`: a run's chain, or the velocities of a search, for other programs.
 
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console};
 use crate::numerics::text::shown;
 use crate::runs::export::{self, Contents};
@@ -46,6 +47,7 @@ enum Format {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let _signals = Signals::catch(RESULT)?;
     let format = match args.format {
         Format::Zarr => export::Format::Zarr,
         Format::Emcee => export::Format::Emcee,

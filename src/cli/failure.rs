@@ -136,6 +136,7 @@ impl Failure {
             ForecastError::Campaign(error @ CampaignError::Nights { .. }) => Failure::input(error.to_string()),
             ForecastError::TooFewTimes { .. } => Failure::input(error.to_string()),
             ForecastError::Plan(PlanError::Frequencies(error)) => Failure::of(error),
+            ForecastError::Plan(error @ PlanError::TooLong { .. }) => Failure::input(error.to_string()),
             error => Failure::failed(error),
         }
     }
@@ -226,21 +227,13 @@ impl From<SimulateError> for Failure {
             error @ (SimulateError::Nothing { .. } | SimulateError::ObservedLight { .. }) => {
                 Failure::input(error.to_string())
             }
-            SimulateError::WriteLight(error) => error.into(),
-            error @ SimulateError::Folder { .. } => Failure::failed(error),
-            SimulateError::Write(error) => error.into(),
         }
     }
 }
 
 impl From<InjectError> for Failure {
     fn from(error: InjectError) -> Self {
-        match error {
-            error @ InjectError::Orbit { .. } => Failure::input(error.to_string()),
-            error @ InjectError::Folder { .. } => Failure::failed(error),
-            InjectError::Write(error) => error.into(),
-            InjectError::Profiles(error) => error.into(),
-        }
+        Failure::input(error.to_string())
     }
 }
 

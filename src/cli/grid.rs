@@ -63,12 +63,13 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         spinner.finish_and_clear();
         scan.map_err(failed)?
     } else {
+        let claim = GridScan::claim(folder, args.output.replaces()).map_err(failed)?;
+        signals.undo_by(claim.undo());
         let scene = fitted(global, scene.clone());
         let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
         signals.defer();
-        let folder = args.output.create()?;
         let spinner = progress::bar(global, None, "start images for distant nodes");
-        let scan = GridScan::begin(&scene, plan, found, folder, args.output.replaces());
+        let scan = GridScan::begin(&scene, plan, found, folder, claim);
         spinner.finish_and_clear();
         scan.map_err(failed)?
     };

@@ -1,11 +1,12 @@
 //! `dimcmc import`: a config from another program's input files.
 
 use super::init::{KnownArgs, next_commands};
-use super::output::{ConfigFile, folder_of};
+use super::output::ConfigFile;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console, progress};
 use crate::data::import::Import;
 use crate::data::init::{List, Place, propose};
-use crate::data::io::atomic;
+use crate::data::io::atomic::{self, folder_of};
 use crate::data::io::zdipy::{Input, LINE_FILE, LocalLineFile};
 use crate::numerics::text::shown;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     let config = args.output.path();
     let list = list_beside(config);
     args.output.check(Some(&list))?;
@@ -55,6 +57,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     spinner.finish_and_clear();
     let proposal = proposal.map_err(|error| args.known.failure(error, &args.input))?;
     args.output.check(Some(&list))?;
+    signals.defer();
     // the list first, so that where the config is its observations are
     atomic::write(&list, import.list.as_bytes())?;
     atomic::write(config, proposal.json.as_bytes())?;

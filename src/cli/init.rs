@@ -1,6 +1,7 @@
 //! `dimcmc init`: a first config for observed profiles.
 
 use super::output::ConfigFile;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console, progress};
 use crate::data::config::{ConfigError, Spectrograph};
 use crate::data::dataset::SceneError;
@@ -240,11 +241,13 @@ impl KnownArgs {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     let spinner = progress::bar(global, None, "first look, test fit");
     let proposal = args.proposal(&|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal?;
     args.output.check(None)?;
+    signals.defer();
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));
     next_commands(&proposal, args.output.path());

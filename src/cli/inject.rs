@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
+use super::signals::{RESULT, Signals};
 use crate::data::config::Config;
 use crate::data::io::{lsd, truth};
 use crate::data::scene::Scene;
@@ -41,6 +42,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let scene = Scene::new(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| name == CONFIG)?;
@@ -50,6 +52,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let Args { k_kms, porb_over_prot, phi, .. } = *args;
     let injected = Injected::of(&scene, Orbit { k_kms, porb_over_prot, phi })?;
+    signals.defer();
     let folder = args.output.create()?;
     injected.write(folder)?;
     let lines = injected.lines().into_iter();

@@ -2,6 +2,7 @@
 
 use super::output::{Output, fitted, scene};
 use super::report_lines::Report;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, progress};
 use crate::data::config::Config;
 use crate::data::io::map::{FILES, LIGHT_CURVES};
@@ -30,6 +31,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name) || name == LIGHT_CURVES)?;
@@ -38,6 +40,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let maps = Maps::of(&scene, args.times.as_deref(), &|what| spinner.set_message(what));
     spinner.finish_and_clear();
     let maps = maps.map_err(Failure::maps)?;
+    signals.defer();
     let folder = args.output.create()?;
     maps.write(folder)?;
     let report = maps.lines().into_iter().fold(Report::default(), |report, (label, text)| report.line(label, text));

@@ -1,6 +1,7 @@
 //! `dimcmc merge`: runs of independent ensembles joined into one.
 
 use super::output::Output;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, analyse, console};
 use crate::numerics::text::shown;
 use crate::runs::merge::{MergeError, merge};
@@ -24,6 +25,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let same = |run: &&PathBuf| std::fs::canonicalize(run).ok() == std::fs::canonicalize(args.output.folder()).ok();
     if args.output.folder().exists() && args.runs.iter().any(|run| same(&run)) {
@@ -31,6 +33,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         return Err(Failure::input(format!("--out {}: {problem}", args.output.folder().display())));
     }
     let merged = merge(&args.runs).map_err(failure)?;
+    signals.defer();
     let folder = args.output.create()?;
     merged.write(folder, args.output.replaces()).map_err(failure)?;
     analyse::report(folder, &merged.manifest, &merged.chain)?;

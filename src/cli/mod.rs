@@ -39,7 +39,7 @@ mod survey;
 pub use failure::Failure;
 pub use init::first_config;
 
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -119,12 +119,43 @@ fn command() -> clap::Command {
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let matches = match command().try_get_matches_from(arguments) {
         Ok(matches) => matches,
-        Err(error) => match has_moved(&error) {
-            Some(failure) => return console::end(Err(failure)),
-            None => error.exit(),
-        },
+        Err(error) => return misused(&error),
     };
-    console::end(run(&Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())))
+    match Cli::from_arg_matches(&matches) {
+        Ok(cli) => console::end(run(&cli)),
+        Err(error) => misused(&error),
+    }
+}
+
+/// Prints the help that was asked for, or in one line what is wrong with the arguments. The exit code.
+fn misused(error: &clap::Error) -> u8 {
+    if let Some(failure) = has_moved(error) {
+        return console::end(Err(failure));
+    }
+    if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        error.exit();
+    }
+    console::end(Err(Failure::input(in_one_line(&error.to_string()))))
+}
+
+/// What clap says on several lines: the error, what was meant, and where help is.
+fn in_one_line(text: &str) -> String {
+    let (said, usage) = text.split_once("\n\nUsage: ").unwrap_or((text, ""));
+    let said = said.split("\n\nFor more").next().unwrap_or_default().trim().trim_start_matches("error: ");
+    let parts: Vec<String> = said
+        .split("\n\n")
+        .map(|part| {
+            let lines: Vec<&str> = part.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+            let head = lines.first().copied().unwrap_or_default();
+            match lines.len() {
+                0 | 1 => head.to_owned(),
+                _ => format!("{head} {}", lines[1..].join(", ")),
+            }
+        })
+        .collect();
+    let command: Vec<&str> = usage.split_whitespace().take_while(|word| !word.starts_with(['[', '<', '-'])).collect();
+    let help = if command.is_empty() { "dimcmc".to_owned() } else { command.join(" ") };
+    format!("{}; see {help} --help", parts.join("; "))
 }
 
 /// Where a command went that is none any more.
@@ -165,6 +196,28 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Man(args) => man::run(args),
         Command::Plot(args) => plot::run(args, &cli.global),
         Command::Report(args) => report::run(args, &cli.global),
+    }
+}
+
+#[test]
+fn what_is_wrong_with_arguments_is_one_line() {
+    for (text, line) in [
+        (
+            "error: unexpected argument '--forc' found\n\n  tip: a similar argument exists: '--force'\n\nUsage: dimcmc \
+             map --out <DIR> <CONFIG>\n\nFor more information, try '--help'.\n",
+            "unexpected argument '--forc' found; tip: a similar argument exists: '--force'; see dimcmc map --help",
+        ),
+        (
+            "error: the following required arguments were not provided:\n  --out <DIR>\n  <CONFIG>\n\nUsage: dimcmc \
+             map --out <DIR> <CONFIG>\n\nFor more information, try '--help'.\n",
+            "the following required arguments were not provided: --out <DIR>, <CONFIG>; see dimcmc map --help",
+        ),
+        (
+            "error: invalid value '0' for '--draws <N>': 0 is not in 1..\n\nFor more information, try '--help'.\n",
+            "invalid value '0' for '--draws <N>': 0 is not in 1..; see dimcmc --help",
+        ),
+    ] {
+        assert_eq!(in_one_line(text), line);
     }
 }
 

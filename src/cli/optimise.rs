@@ -2,6 +2,7 @@
 
 use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console};
 use crate::data::config::Config;
 use crate::runs::optimum::{self, OptimumFile};
@@ -22,6 +23,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| name == optimum::FILE)?;
@@ -30,6 +32,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let scene = fitted(global, scene);
     let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);
+    signals.defer();
     let folder = args.output.create()?;
     file.write(folder)?;
     console::print(file.table());

@@ -5,6 +5,7 @@
 
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
+use crate::data::io::atomic::{clear_abandoned, folder_of};
 use crate::data::scene::{Scene, SceneError};
 use crate::runs::{fitted, grid_scan, run};
 use std::io::ErrorKind;
@@ -66,6 +67,7 @@ impl Output {
     pub fn check(&self) -> Result<(), Failure> {
         let folder = self.folder.display();
         let wrong = |problem: String| Err(Failure::input(format!("--out {folder}: {problem}")));
+        clear_abandoned(&self.folder);
         match std::fs::read_dir(&self.folder) {
             Ok(mut entries) => match entries.next() {
                 None => self.is_writable(&self.folder),
@@ -205,11 +207,6 @@ impl ConfigFile {
         const NAME: &str = "dimcmc.schema.json";
         folder_of(&self.path).join(NAME).is_file().then(|| NAME.to_owned())
     }
-}
-
-/// The folder that a file is in.
-pub fn folder_of(file: &Path) -> &Path {
-    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Whether two paths lead to the same file that is there, or its name stands in the same folder.

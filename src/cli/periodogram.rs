@@ -1,6 +1,7 @@
 //! `dimcmc periodogram`: the blind search for a planet.
 
 use super::output::{Output, fitted, scene};
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;
@@ -55,6 +56,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
@@ -69,6 +71,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     });
     spinner.finish_and_clear();
     let found = found?;
+    signals.defer();
     let folder = args.output.create()?;
     found.write(folder)?;
     let (table, files) = (found.table(), found.files().join(", "));

@@ -1,6 +1,7 @@
 //! `dimcmc plan`: which planets profiles would show that are not yet taken.
 
 use super::output::Output;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;
@@ -56,6 +57,7 @@ fn nights(text: &str) -> Result<usize, String> {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     args.output.spare(&args.configs, |name| [CSV, JSON].contains(&name))?;
     let configs = args.configs.iter().map(|path| Config::load(path)).collect::<Result<Vec<_>, _>>()?;
@@ -67,6 +69,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         Forecast::of(&configs, &args.nights, periods, &settings, &|message| spinner.set_message(message.to_owned()));
     spinner.finish_and_clear();
     let forecast = forecast.map_err(Failure::plan)?;
+    signals.defer();
     let folder = args.output.create()?;
     forecast.write(folder)?;
     console::line(format_args!("{}\nwritten: {}: {CSV}, {JSON}", forecast.table(), shown(folder)));

@@ -2,6 +2,7 @@
 
 use super::output::Output;
 use super::report_lines::Report;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global};
 use crate::figures::plot::{self, DPI};
 use crate::runs::grid_scan::HEADER;
@@ -42,6 +43,7 @@ fn dpi(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     let folder = args.out.clone().unwrap_or_else(|| args.folder.join("figures"));
     let output = Output::to(folder, args.force);
     output.check()?;
@@ -54,11 +56,9 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         )));
     }
     let figures = plot::figures(&args.folder, args.run.as_deref())?;
+    signals.defer();
     let folder = output.create()?;
-    let mut files = Vec::new();
-    for figure in &figures {
-        files.extend(plot::write(figure, folder, args.dpi)?);
-    }
+    let files = plot::write(&figures, folder, args.dpi)?;
     let mut report = Report::default();
     for note in figures.iter().flat_map(|figure| &figure.notes) {
         report = report.line("note", note);

@@ -1,6 +1,7 @@
 //! `dimcmc report`: one page of a star.
 
 use super::report_lines::Report;
+use super::signals::{RESULT, Signals};
 use super::{Failure, Global};
 use crate::data::io::atomic;
 use crate::figures::report;
@@ -29,6 +30,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     let usual = || match &args.folders[..] {
         [one] => one.join("report.html"),
         several => several[0].parent().unwrap_or(Path::new("")).join("report.html"),
@@ -51,6 +53,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         )));
     }
     let page = report::report(&args.folders)?;
+    signals.defer();
     atomic::write(&file, page.as_bytes())?;
     Report::default().line("written", file.display()).print();
     Ok(())

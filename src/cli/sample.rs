@@ -86,13 +86,13 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             Start::Optimum => StartFrom::Optimum,
             Start::Prior => StartFrom::Prior,
         };
+        let claim = Run::claim(folder, args.output.replaces()).map_err(failed)?;
+        signals.undo_by(claim.undo());
         let scene = fitted(global, scene.clone());
         let found = search(global, &args.config, &scene, &scene.space)?;
         let spinner = progress::bar(global, None, "start of the walkers");
-        args.output.check()?;
         signals.defer();
-        let run =
-            Run::in_memory(&scene, found, from, &pool).and_then(|run| run.kept_in(folder, args.output.replaces()));
+        let run = Run::in_memory(&scene, found, from, &pool).and_then(|run| run.kept_by(claim, folder));
         spinner.finish_and_clear();
         run.map_err(failed)?
     };

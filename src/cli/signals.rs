@@ -7,14 +7,21 @@ use super::failure::{INTERRUPTED, RESUME};
 use super::{Failure, console};
 use signal_hook::consts::SIGINT;
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What commands have not come to whose results are written in one go.
+pub const RESULT: &str = "result";
+
+/// What is done before a signal ends the program.
+type Undo = Box<dyn FnOnce() + Send>;
 
 /// What signals do from now on.
 pub struct Signals {
     stop: Arc<AtomicBool>,
     deferred: Arc<AtomicBool>,
     code: Arc<AtomicU8>,
+    undo: Arc<Mutex<Option<Undo>>>,
 }
 
 impl Signals {
@@ -22,9 +29,15 @@ impl Signals {
     /// first one sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first
     /// `unit`. What comes before this is the system's: call it first.
     pub fn catch(unit: &'static str) -> Result<Self, Failure> {
-        let signals = Signals { stop: Arc::default(), deferred: Arc::default(), code: Arc::new(INTERRUPTED.into()) };
-        let Signals { stop, deferred, code } = &signals;
-        let (stop, deferred, code) = (Arc::clone(stop), Arc::clone(deferred), Arc::clone(code));
+        let signals = Signals {
+            stop: Arc::default(),
+            deferred: Arc::default(),
+            code: Arc::new(INTERRUPTED.into()),
+            undo: Arc::default(),
+        };
+        let Signals { stop, deferred, code, undo } = &signals;
+        let (stop, deferred) = (Arc::clone(stop), Arc::clone(deferred));
+        let (code, undo) = (Arc::clone(code), Arc::clone(undo));
         let incoming = incoming().map_err(|e| Failure::failed(format!("signals cannot be caught: {e}")))?;
         std::thread::spawn(move || {
             for signal in incoming {
@@ -33,6 +46,9 @@ impl Signals {
                     code.store(RESUME, Ordering::SeqCst);
                 }
                 if !deferred.load(Ordering::SeqCst) {
+                    if let Some(undo) = undo.lock().unwrap_or_else(PoisonError::into_inner).take() {
+                        undo();
+                    }
                     console::error_below_progress(before_the_first(unit));
                     std::process::exit(code.load(Ordering::SeqCst).into());
                 }
@@ -50,6 +66,11 @@ impl Signals {
         let signals = Signals::catch("answer")?;
         signals.defer();
         Ok(signals)
+    }
+
+    /// What is to be done before a signal ends the program, until [`Signals::defer`].
+    pub fn undo_by(&self, undo: impl FnOnce() + Send + 'static) {
+        *self.undo.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(undo));
     }
 
     /// From now on there is something to lose.

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
+use super::signals::{RESULT, Signals};
 use crate::data::config::Config;
 use crate::runs::simulated::Simulated;
 use std::path::PathBuf;
@@ -23,9 +24,11 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let simulated = Simulated::of(&Config::load(&args.config)?)?;
     args.output.spare(simulated.read(), |name| simulated.writes(name))?;
+    signals.defer();
     let folder = args.output.create()?;
     simulated.write(folder)?;
     let lines = simulated.lines().into_iter();

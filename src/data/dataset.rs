@@ -8,6 +8,7 @@ use crate::data::io::light_curve::{self, Measurements};
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::simulate::Simulation;
 use crate::star::observation::Observations;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 pub use crate::data::io::lsd::ProfileSet;
@@ -83,7 +84,10 @@ impl Dataset {
             LightSource::File(path) => Some(path.clone()),
             LightSource::Simulate(_) => None,
         }));
+        enough(settings, &sets)?;
         one_day_count(settings, &sets)?;
+        no_profile_twice(settings, &sets)?;
+        no_light_curve_twice(settings, &light_curves)?;
         let times_d: Vec<f64> = sets.iter().flat_map(|set: &ProfileSet| set.observations.times_d()).collect();
         light_curves.iter_mut().for_each(|curve| curve.count_as(&times_d));
         Ok(Dataset { sets, light_curves, files })
@@ -100,7 +104,10 @@ pub fn in_memory(observations: Observations, name: impl Fn(usize) -> String) -> 
 /// The profiles of a data `set`, read or simulated.
 fn profiles(settings: &Settings, set: &DataSetSettings) -> Result<ProfileSet, SceneError> {
     match &set.source {
-        ObservationSource::Files { path, velocity_range_kms, .. } => Ok(lsd::read_around(path, *velocity_range_kms)?),
+        ObservationSource::Files { path, velocity_range_kms, .. } => Ok(match settings.sets.len() {
+            1 => lsd::read_around(path, *velocity_range_kms)?,
+            _ => lsd::read_one_of_several(path, *velocity_range_kms)?,
+        }),
         ObservationSource::Simulate(simulation) => {
             settings.check_velocity_grid(&set.star, &simulation.truth, simulation.step_kms)?;
             let of = if settings.sets.len() > 1 { format!(" of {}", set.name) } else { String::new() };
@@ -125,7 +132,7 @@ fn without_excluded(
     all.labels.retain(|_| times_d.next().is_some_and(|time_d| !is_within(&set.exclude, time_d)));
     all.observations.profiles.retain(|profile| !is_within(&set.exclude, profile.time_d));
     let left = all.labels.len();
-    let (fewest, are) = if settings.sets.len() > 1 { (1, "is") } else { (2, "are") };
+    let (fewest, are) = if settings.sets.len() > 1 { (1, "is") } else { (lsd::FEWEST, "are") };
     if left < before && left < fewest {
         let problem = format!("leaves {left} of {before} profiles, {fewest} at least {are} needed");
         return Err(settings.fault(&format!("{}.exclude", set.key), &problem));
@@ -135,6 +142,56 @@ fn without_excluded(
         all.remarks.push(format!("{left_out} of {before} left out: they lie within the times of exclude"));
     }
     Ok(all)
+}
+
+/// That the star was observed more than once, whatever the data sets are.
+fn enough(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
+    let count: usize = sets.iter().map(|set| set.labels.len()).sum();
+    let is_observed = settings.sets.iter().any(|set| matches!(set.source, ObservationSource::Files { .. }));
+    match sets.len() > 1 && is_observed && count < lsd::FEWEST {
+        true => Err(settings.fault("observations", &format!("{count} profile in all, {} are needed", lsd::FEWEST))),
+        false => Ok(()),
+    }
+}
+
+/// That no profile is in two data sets: its noise would be taken for a signal seen twice.
+fn no_profile_twice(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
+    let mut seen: HashMap<Vec<u64>, (usize, &Label)> = HashMap::new();
+    for (s, set) in sets.iter().enumerate() {
+        for (profile, label) in set.observations.profiles.iter().zip(&set.labels) {
+            let numbers = std::iter::once(profile.time_d + 0.0).chain(profile.intensity.iter().copied());
+            match seen.insert(numbers.map(f64::to_bits).collect(), (s, label)) {
+                Some((other, its)) if other != s => {
+                    let [one, other] = [s, other].map(|s| &settings.sets[s]);
+                    let problem = format!(
+                        "{} ({} d) is {} of {} ({}) as well: give each profile once",
+                        label.file, profile.time_d, its.file, other.key, other.name
+                    );
+                    return Err(settings.fault(&one.key, &problem));
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// That no two light curves are the same measurements, for the most part.
+fn no_light_curve_twice(settings: &Settings, curves: &[Measurements]) -> Result<(), ConfigError> {
+    let numbers = |curve: &Measurements| {
+        curve.fluxes.iter().map(|one| [one.time_d, one.flux].map(f64::to_bits)).collect::<HashSet<_>>()
+    };
+    let all: Vec<HashSet<[u64; 2]>> = curves.iter().map(numbers).collect();
+    for (k, one) in all.iter().enumerate() {
+        let shared = |other: &HashSet<[u64; 2]>| one.intersection(other).count();
+        if let Some(other) = (0..k).find(|j| 2 * shared(&all[*j]) > one.len().min(all[*j].len())) {
+            let (count, other) = (shared(&all[other]), &settings.light_curves[other]);
+            let problem =
+                format!("{count} of its measurements are those of {} ({}): give each once", other.key, other.name);
+            return Err(settings.fault(&settings.light_curves[k].key, &problem));
+        }
+    }
+    Ok(())
 }
 
 /// That days of all data sets are of one count.

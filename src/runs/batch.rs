@@ -22,6 +22,9 @@ use std::path::{Path, PathBuf};
 /// Name of the file with what came of all of them.
 pub const FILE: &str = "batch.json";
 
+/// Name of the file that is locked while a batch is at work, so that no other one writes its table over.
+pub const LOCK: &str = ".batch.lock";
+
 /// A star of a list.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Star {
@@ -111,10 +114,11 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
         }
         Run::resume(&scene, folder, None, pool)?
     } else {
+        let claim = Run::claim(folder, true)?;
         scene = fitted(scene, &|_| ());
         let settings = scene.search_settings();
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
-        Run::in_memory(&scene, found, StartFrom::Optimum, pool)?.kept_in(folder, true)?
+        Run::in_memory(&scene, found, StartFrom::Optimum, pool)?.kept_by(claim, folder)?
     };
     if run.go(pool, |_, _| ())? == crate::sampling::ensemble::StopReason::Interrupted {
         return Ok(End::Interrupted);

@@ -5,10 +5,11 @@
 //! batch under way.
 
 use crate::data::config::{GridSettings, MOST_NODES};
-use crate::data::io::atomic::{WriteError, write_json};
+use crate::data::io::atomic::{WriteError, clear_abandoned, write_json};
 use crate::data::io::landscape;
-use crate::data::io::lines::{self, JournalError, LineFile};
+use crate::data::io::lines::{self, Claim, JournalError, LineFile};
 use crate::data::io::paraboloid::{self, ParaboloidFile};
+use crate::data::io::saved::Saved;
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::runs::origin::{self, Origin, OriginError};
@@ -56,6 +57,8 @@ pub struct Header {
 fn likelihood_numbers() -> Vec<String> {
     LIKELIHOOD_NUMBERS.map(str::to_owned).to_vec()
 }
+
+impl Saved for Header {}
 
 impl Header {
     /// What to bear in mind of the landscape.
@@ -124,23 +127,33 @@ impl GridScan {
         is_false_start(folder, true)
     }
 
-    /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes
-    /// `found`. A landscape that is there already is replaced if `replace`, and refused otherwise.
+    /// Claims `folder`, which is made, for a landscape whose reference is yet to be found: others are refused from now
+    /// on.
     ///
     /// # Errors
-    /// [`GridScanError`]: files that are there already, or cannot be written.
+    /// A folder that holds a landscape already (unless `replace`), in which another process begins one, or that cannot
+    /// be written.
+    pub fn claim(folder: &Path, replace: bool) -> Result<Claim, GridScanError> {
+        Ok(Claim::of(&folder.join(NODES), replace)?)
+    }
+
+    /// Begins the landscape of `plan` in `folder`, which was claimed, with the reference that a search over its axes
+    /// `found`.
+    ///
+    /// # Errors
+    /// [`GridScanError`]: files that cannot be written.
     pub fn begin(
         scene: &Scene,
         plan: &GridSettings,
         found: Found,
         folder: &Path,
-        replace: bool,
+        claim: Claim,
     ) -> Result<Self, GridScanError> {
         let grid = &plan.grid;
         let numbers = found.posterior.likelihood_numbers().iter().map(|name| (*name).to_owned()).collect();
         let header = Header { origin: Origin::of(scene, &found), grid: grid.clone(), numbers };
         // the nodes first: whoever holds them may write the header
-        let file = LineFile::create(&folder.join(NODES), replace)?;
+        let file = claim.begin()?;
         let path = folder.join(PARABOLOID);
         match std::fs::remove_file(&path) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(WriteError { path, source })?,
@@ -156,6 +169,7 @@ impl GridScan {
     /// # Errors
     /// [`GridScanError`]: no landscape there, changed config, grid or data, broken lines.
     pub fn resume(scene: &Scene, plan: &GridSettings, folder: &Path) -> Result<Self, GridScanError> {
+        clear_abandoned(folder);
         let header = Header::read(folder)?;
         header.origin.check(scene, folder)?;
         if let Some(what) = change(&header.grid, &plan.grid) {

@@ -3,15 +3,15 @@
 
 use crate::data::calibrated::of_sets;
 use crate::data::config::{self, DataSetSettings, Settings};
-use crate::data::io::atomic::{self, WriteError};
-use crate::data::io::lsd::{self, LsdError};
+use crate::data::io::atomic::{self, WriteError, write_set};
+use crate::data::io::lsd;
 use crate::data::io::truth::{self, InjectedTruth};
 use crate::data::scene::Scene;
 use crate::model::Parameter;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::{Observations, Profile};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the config that is written beside the profiles.
 pub const CONFIG: &str = "config.json";
@@ -40,20 +40,6 @@ pub enum InjectError {
         /// What it must be.
         must: String,
     },
-    /// A folder cannot be made.
-    #[error("{}: cannot be created: {source}", folder.display())]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Config or truth cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// Profiles cannot be written.
-    #[error(transparent)]
-    Profiles(#[from] LsdError),
 }
 
 /// Where the profiles of a data set go, below the folder of all: there for one, else in a folder of its name.
@@ -81,12 +67,16 @@ impl<'a> Injected<'a> {
     ///
     /// # Errors
     /// A folder that cannot be made, a file that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), InjectError> {
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_set(folder, &|stage| self.fill(stage))
+    }
+
+    fn fill(&self, folder: &Path) -> Result<(), WriteError> {
         let Injected { scene, orbit, sets, velocity_kms } = self;
         for (s, (set, own)) in scene.settings.sets.iter().zip(sets).enumerate() {
             let folder = folder.join(folder_of(scene, set));
             if let Err(source) = std::fs::create_dir_all(&folder) {
-                return Err(InjectError::Folder { folder, source });
+                return Err(WriteError { path: folder, source });
             }
             lsd::write_as(&folder, own, &scene.data.sets[s].labels, "with an injected orbit")?;
             let truth = InjectedTruth {
@@ -99,7 +89,7 @@ impl<'a> Injected<'a> {
             truth::write(&folder, &truth)?;
         }
         let config = scene.settings.with_observations(|set| format!("{}observations.txt", folder_of(scene, set)));
-        Ok(atomic::write(&folder.join(CONFIG), config::to_text(&config).as_bytes())?)
+        atomic::write(&folder.join(CONFIG), config::to_text(&config).as_bytes())
     }
 
     /// What was made, label and text a line.

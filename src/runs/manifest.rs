@@ -9,12 +9,13 @@ pub use conclusions::RunSummary;
 
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
+use crate::data::io::saved::Saved;
 use crate::model::{
     Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, definition, in_earths,
 };
 use crate::runs::blind_search::SearchSummary;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
-use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
+use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Record, Settled, Shape, Summary, summarise};
 use crate::sampling::ensemble::Positions;
 use crate::surface::{CHI2, SPOTTEDNESS};
 use serde::{Deserialize, Serialize};
@@ -62,6 +63,8 @@ pub struct Manifest {
 fn posterior_numbers() -> Vec<String> {
     [SPOTTEDNESS, CHI2].map(str::to_owned).to_vec()
 }
+
+impl Saved for Manifest {}
 
 impl Manifest {
     /// What a reader of the chain must know beside it, one line each.
@@ -169,6 +172,10 @@ impl Manifest {
         if count != manifest.names.len() || !manifest.names.iter().all(is_free) {
             return wrong("names: are not the parameters of the config".into());
         }
+        let prior = |name: &String| manifest.prior(name).is_none();
+        if let Some(name) = manifest.names.iter().find(|name| prior(name)) {
+            return wrong(format!("priors.{name}: is missing, or no prior"));
+        }
         match manifest.has_shape() {
             true => Ok(manifest),
             false => wrong("start: is not of as many ensembles, walkers and parameters as the rest says".into()),
@@ -178,6 +185,23 @@ impl Manifest {
     /// What it was begun with, and the names of its parameters.
     fn parts(&self) -> (&Origin, Vec<String>) {
         (&self.origin, self.names.clone())
+    }
+
+    /// The prior of a parameter.
+    fn prior(&self, name: &str) -> Option<Prior> {
+        serde_json::from_value(self.priors.get(name)?.clone()).ok()
+    }
+
+    /// The first line of a chain (from 1) that its priors exclude, and why.
+    pub fn outside(&self, chain: &Chain) -> Option<(usize, String)> {
+        let priors: Vec<Option<Prior>> = self.names.iter().map(|name| self.prior(name)).collect();
+        let problem = |record: &Record| {
+            let mut values = self.names.iter().zip(&priors).zip(&record.theta);
+            let ((name, prior), x) = values.find(|((_, prior), x)| prior.is_some_and(|p| !holds(&p, **x)))?;
+            let (min, max) = prior.map_or((f64::NAN, f64::NAN), |prior| prior.bounds());
+            Some(format!("{name} {x} is outside its prior ({min} to {max}): no draw of this run"))
+        };
+        chain.records().iter().enumerate().find_map(|(k, record)| Some((k + 1, problem(record)?)))
     }
 
     /// Whether the start is of the chain's shape.
@@ -226,6 +250,20 @@ impl Manifest {
         Ok(Config::at(self.origin.config.clone(), &folder.join(FILE)).settings()?)
     }
 }
+
+/// Whether a prior holds a value, within rounding at its bounds and as far as a Gaussian without bounds can reach.
+fn holds(prior: &Prior, x: f64) -> bool {
+    let (min, max) = prior.bounds();
+    let slack = 1e-9 * if (max - min).is_finite() { max - min } else { 1.0 };
+    let within_reach = match prior {
+        Prior::Normal { mean, sd, .. } => (x - mean).abs() <= BEYOND_GAUSSIAN * sd,
+        _ => true,
+    };
+    x >= min - slack && x <= max + slack && within_reach
+}
+
+/// A Gaussian has no double-precision density beyond so many standard deviations.
+const BEYOND_GAUSSIAN: f64 = 40.0;
 
 /// What sort of number each free parameter is, and the goals of the chain.
 pub fn kinds_and_goals(settings: &Settings) -> (Vec<ParameterKind>, Goals) {

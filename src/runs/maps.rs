@@ -1,6 +1,7 @@
 //! What `map` finds: one image of the star, or the maps of a star that may change; with the reason where they do not
 //! fit.
 
+use crate::data::calibrated::suspects;
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::map::{FILES, LIGHT_CURVES, MapResult};
@@ -89,7 +90,8 @@ impl<'a> Maps<'a> {
             }
             Err(NoMaps::Times(error)) => Err(MapError::Times(error.to_owned())),
             Err(error) => {
-                let reason = diagnosis.map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text));
+                let reason = suspects(&scene.measured.profiles)
+                    + &diagnosis.map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text));
                 Err(MapError::NoMaps { config: scene.settings.path.clone(), error, reason })
             }
         }
@@ -203,7 +205,7 @@ impl FreeVelocities {
 pub fn reason(scene: &Scene) -> String {
     let map_changes = scene.settings.imaging.objective.properties().map_changes;
     let told = diagnosis(scene).filter(|diagnosis| !map_changes || diagnosis.reason != Reason::Errors);
-    told.map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text))
+    suspects(&scene.measured.profiles) + &told.map_or_else(String::new, |told| format!("; {}", told.text))
 }
 
 /// Why no map of `scene` fits, by trying.

@@ -5,11 +5,12 @@
 //! ensembles.
 
 use crate::data::config::{self, Config, ConfigError};
-use crate::data::io::atomic::WriteError;
-use crate::data::io::journal::{self, Journal, JournalError};
+use crate::data::io::atomic::{WriteError, write_set};
+use crate::data::io::journal::{Journal, JournalError};
+use crate::data::io::lines;
 use crate::runs::manifest::Manifest;
 use crate::runs::origin::OriginError;
-use crate::runs::run::CHAIN;
+use crate::runs::run::{CHAIN, SUMMARY, read_chain};
 use crate::sampling::chain::{Chain, ChainError, Record};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -92,7 +93,7 @@ pub fn merge(folders: &[PathBuf]) -> Result<Merged, MergeError> {
             }
         }
     }
-    let read = |(folder, manifest): (&PathBuf, &Manifest)| journal::read(&folder.join(CHAIN), &manifest.shape());
+    let read = |(folder, manifest): (&PathBuf, &Manifest)| read_chain(folder, manifest);
     let chains: Vec<Chain> = folders.iter().zip(&manifests).map(read).collect::<Result<_, _>>()?;
     let steps = chains.iter().map(Chain::steps).min().unwrap_or(0);
     if let Some(k) = chains.iter().position(|chain| chain.steps() == 0) {
@@ -107,18 +108,31 @@ pub fn merge(folders: &[PathBuf]) -> Result<Merged, MergeError> {
 }
 
 impl Merged {
-    /// Writes it as a run into `folder`, which is there; one that is there already is replaced if `replace`, and
-    /// refused otherwise.
+    /// Writes it as a run into `folder`, which is there, the chain as a whole: a shorter one would be taken for it. One
+    /// that is there already is replaced if `replace`, unless it is being written, and refused otherwise.
     ///
     /// # Errors
     /// [`MergeError`].
     pub fn write(&self, folder: &Path, replace: bool) -> Result<(), MergeError> {
-        let mut journal = Journal::create(&folder.join(CHAIN), self.manifest.shape(), replace)?;
-        self.manifest.write(folder)?;
+        let path = folder.join(CHAIN);
+        let before = lines::hold(&path)?;
+        if before.is_some() && !replace {
+            return Err(JournalError::Io { path, source: std::io::ErrorKind::AlreadyExists.into() }.into());
+        }
+        match std::fs::remove_file(folder.join(SUMMARY)) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(WriteError { path: folder.join(SUMMARY), source }.into());
+            }
+            _ => Ok(write_set(folder, &|stage| self.fill(stage))?),
+        }
+    }
+
+    fn fill(&self, folder: &Path) -> Result<(), WriteError> {
+        let mut journal = Journal::create(&folder.join(CHAIN), self.manifest.shape(), false)?;
         for step in self.chain.records().chunks(self.chain.shape().size()) {
             journal.append(step)?;
         }
-        Ok(())
+        self.manifest.write(folder)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::provenance::Provenance;
+use crate::data::io::saved::{Saved, as_many, square};
 use crate::data::scene::Scene;
 use crate::inference::search::{Attempt, Found};
 use crate::model::{
@@ -62,6 +63,26 @@ pub struct OptimumFile {
     /// Where all this came from.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+impl Saved for OptimumFile {
+    fn check(&self) -> Result<(), String> {
+        let (names, n) = (&self.names, self.names.len());
+        for (key, values) in [("parameters", &self.optimum.parameters), ("sd", &self.optimum.sd)] {
+            if let Some(name) = names.iter().find(|name| !values.contains_key(*name)) {
+                return Err(format!("{key}: missing {name}"));
+            }
+        }
+        if let Some(name) = names.iter().find(|name| Parameter::from_name(name).is_none()) {
+            return Err(format!("names: unknown parameter {name}"));
+        }
+        square("covariance", &self.covariance, n)?;
+        square("internal_curvature", &self.internal_curvature, n)?;
+        let ends =
+            |one: &'_ StartRecord| std::iter::once(one.start.len()).chain(one.end.as_ref().map(Vec::len)).collect();
+        let ends: Vec<Vec<usize>> = self.starts.iter().map(ends).collect();
+        ends.into_iter().flatten().try_for_each(|found| as_many("starts", found, n, "names"))
+    }
 }
 
 /// One climb.

@@ -5,6 +5,7 @@
 
 use crate::data::config::{self, ConfigError};
 use crate::data::io::provenance::{Measured, Provenance};
+use crate::data::io::saved::{self, Saved};
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::model::ParameterSpace;
@@ -12,7 +13,6 @@ use crate::sampling::optimise::Optimum;
 use crate::surface::density::Density;
 use crate::surface::expansion::nuisances;
 use crate::surface::record::{RebuildError, SurfaceRecord};
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -216,7 +216,7 @@ impl Origin {
 ///
 /// # Errors
 /// As [`read`]; unknown keys, and records of other parameters.
-pub fn read_header<T: DeserializeOwned + Serialize>(
+pub fn read_header<T: Saved + Serialize>(
     folder: &Path,
     file: &'static str,
     parts: impl Fn(&T) -> (&Origin, Vec<String>),
@@ -256,13 +256,18 @@ const OPTIONAL: [&str; 2] = ["measured", "merged_seeds"];
 ///
 /// # Errors
 /// A folder without it, or a file that cannot be read or is not what it should be.
-pub fn read<T: DeserializeOwned>(folder: &Path, file: &'static str) -> Result<T, OriginError> {
+pub fn read<T: Saved>(folder: &Path, file: &'static str) -> Result<T, OriginError> {
     let path = folder.join(file);
     let text = std::fs::read(&path).map_err(|source| match source.kind() {
         std::io::ErrorKind::NotFound => OriginError::Missing { folder: folder.into(), file },
         _ => OriginError::Read { path: path.clone(), source },
     })?;
-    serde_json::from_slice(&text).map_err(|source| OriginError::Json { path, source })
+    let content = |problem| OriginError::Content { path: path.clone(), problem };
+    let json = |source| OriginError::Json { path: path.clone(), source };
+    saved::check_numbers(&serde_json::from_slice(&text).map_err(json)?).map_err(content)?;
+    let value: T = serde_json::from_slice(&text).map_err(json)?;
+    value.check().map_err(content)?;
+    Ok(value)
 }
 
 impl OptimumRecord {

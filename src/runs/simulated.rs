@@ -1,9 +1,9 @@
 //! What `simulate` makes: profiles of a spotted star with a planet, one data set or several, and the truth behind them.
 
 use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource};
-use crate::data::io::atomic::WriteError;
+use crate::data::io::atomic::{WriteError, write_set};
 use crate::data::io::light_curve::{self, Measurements};
-use crate::data::io::lsd::{self, LsdError};
+use crate::data::io::lsd;
 use crate::data::io::truth::{self, Truth};
 use crate::data::scene::{Scene, SceneError};
 use crate::data::simulate::Simulation;
@@ -56,20 +56,6 @@ pub enum SimulateError {
     /// Config or profiles make no sense.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A folder cannot be made.
-    #[error("{}: cannot be created: {source}", folder.display())]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A light curve cannot be written.
-    #[error(transparent)]
-    WriteLight(#[from] WriteError),
-    /// Profiles cannot be written.
-    #[error(transparent)]
-    Write(#[from] LsdError),
 }
 
 impl From<ConfigError> for SimulateError {
@@ -128,14 +114,18 @@ impl Simulated {
     ///
     /// # Errors
     /// A folder that cannot be made, a file that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), SimulateError> {
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_set(folder, &|stage| self.fill(stage))
+    }
+
+    fn fill(&self, folder: &Path) -> Result<(), WriteError> {
         for set in &self.sets {
             let folder = if self.sets.len() == 1 { folder.to_owned() } else { folder.join(&set.name) };
             if let Err(source) = std::fs::create_dir_all(&folder) {
-                return Err(SimulateError::Folder { folder, source });
+                return Err(WriteError { path: folder, source });
             }
             lsd::write(&folder, &set.observations)?;
-            truth::write(&folder, &set.truth).map_err(LsdError::from)?;
+            truth::write(&folder, &set.truth)?;
         }
         for (file, measured) in &self.light_curves {
             light_curve::write_to(&folder.join(file), measured)?;

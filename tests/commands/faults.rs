@@ -137,11 +137,11 @@ fn a_signal_at_any_time_is_told_to_the_scheduler() {
 
 /// A folder of `kilobytes` in memory, if this user may have one.
 #[cfg(target_os = "linux")]
-struct SmallDisk(std::path::PathBuf);
+pub struct SmallDisk(std::path::PathBuf);
 
 #[cfg(target_os = "linux")]
 impl SmallDisk {
-    fn new(folder: &Path, kilobytes: usize) -> Option<Self> {
+    pub fn new(folder: &Path, kilobytes: usize) -> Option<Self> {
         std::fs::create_dir_all(folder).unwrap();
         let size = format!("size={kilobytes}k");
         let mut mount = Command::new("mount");
@@ -155,7 +155,7 @@ impl SmallDisk {
         }
     }
 
-    fn grow(&self) {
+    pub fn grow(&self) {
         let grown = Command::new("mount").args(["-o", "remount,size=1m"]).arg(&self.0).status();
         assert!(grown.unwrap().success());
     }

@@ -187,7 +187,7 @@ pub fn landscape(
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     // one that was stopped goes on
     let mut survey = match GridScan::resume(scene, &plan, folder) {
-        Err(GridScanError::Origin(_)) => GridScan::begin(scene, &plan, found, folder, true)?,
+        Err(GridScanError::Origin(_)) => GridScan::begin(scene, &plan, found, folder, GridScan::claim(folder, true)?)?,
         resumed => resumed?,
     };
     let resumed = !survey.landscape.nodes().is_empty();

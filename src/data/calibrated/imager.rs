@@ -73,11 +73,18 @@ pub fn imager(
 }
 
 /// Finds the velocity offsets of data sets that are fitted, and holds them in `imager`.
-pub(super) fn hold_offsets(settings: &Settings, imager: &mut Imager) -> Result<Vec<HeldZeroPoint>, ConfigError> {
+pub(super) fn hold_offsets(
+    settings: &Settings,
+    imager: &mut Imager,
+    suspects: &str,
+) -> Result<Vec<HeldZeroPoint>, ConfigError> {
     let Some(first) = imager.zero_points.first().map(|prior| prior.set) else { return Ok(Vec::new()) };
     let usual = FrequencySettings::default();
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
     let nuisances = nuisances(&settings.free);
-    offsets::hold(imager, settings.values, &nuisances, settings.known_field(), frequencies.as_ref())
-        .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))
+    offsets::hold(imager, settings.values, &nuisances, settings.known_field(), frequencies.as_ref()).map_err(|e| {
+        let set = &settings.sets[first].key;
+        let problem = format!("no spots fit the profiles, so that the RV offset of {set} cannot be found: {e}");
+        settings.fault("observations", &format!("{problem}{suspects}"))
+    })
 }

@@ -14,7 +14,7 @@ pub use strength::star_for;
 use crate::data::config::{Automatic, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter};
 use crate::data::dataset::{Dataset, ProfileSet, SceneError};
 use crate::data::ephemeris::Ephemeris;
-use crate::data::io::lsd::LsdError;
+use crate::data::io::lsd::{self, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet};
 use crate::star::observation::Observations;
 use crate::surface::calibration::noise::MeasuredErrors;
@@ -72,9 +72,10 @@ impl Calibrated {
         let (zero_points, velocity_jitter) =
             errors::zero_points(settings, &imager, settings.velocity_jitter, chi2_target)?;
         let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
-        let mut held = imager::hold_offsets(settings, &mut imager)?.into_iter();
+        let remarks = remarks(settings, data);
+        let mut held = imager::hold_offsets(settings, &mut imager, &suspects(&remarks))?.into_iter();
         let mut measured = Measured {
-            profiles: remarks(settings, data),
+            profiles: remarks,
             velocity_jitter,
             seasons: if seasons.len() > 1 { seasons } else { Vec::new() },
             light_curves: light_curves.iter().map(Binned::line).collect(),
@@ -145,6 +146,11 @@ fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
         profiles.remarks.iter().map(of).collect::<Vec<_>>()
     };
     settings.sets.iter().zip(&data.sets).flat_map(of_set).collect()
+}
+
+/// Of `remarks` on profiles those that may be why nothing fits, each behind `; `.
+pub fn suspects(remarks: &[String]) -> String {
+    remarks.iter().filter(|remark| lsd::tells_of_wild_bin(remark)).map(|remark| format!("; {remark}")).collect()
 }
 
 /// The target chi2 per datum, and how it was chosen where the config leaves it to the observations. That of the config

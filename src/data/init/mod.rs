@@ -134,7 +134,8 @@ fn measured(list: &List, known: &Known) -> Result<Set, ProposalError> {
         wavelength_nm: list.wavelength_nm.clone().or_else(|| known.wavelength_nm.clone()),
         ..known.clone()
     };
-    let profiles = lsd::read_listed(list.list, list.list_bytes, known.range_kms()).map_err(SceneError::from)?;
+    let profiles =
+        lsd::read_listed(list.list, list.list_bytes, known.range_kms(), lsd::FEWEST).map_err(SceneError::from)?;
     let mut whole = match &known.velocity_range_kms {
         Some(given) if known.only_within_range => profiles.within(Some(given.value), 1.0).map_err(SceneError::from)?,
         _ => profiles.observations.clone(),

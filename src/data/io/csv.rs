@@ -1,11 +1,9 @@
 //! Tables as comma-separated text. Floats are written so that they read back exactly.
 
 use super::FileError;
+use super::saved::LARGEST;
 use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
-
-/// Beyond this a finite number is no result of this program, and nothing can be drawn with it.
-const LARGEST: f64 = 1e100;
 
 /// Column of the number of each profile's data set, from 1, where there are several.
 pub const DATA_SET: &str = "data_set";

@@ -1,6 +1,6 @@
 //! The journal: `chain.jsonl`, one line per step, ensemble and walker, appended by whole steps.
 
-use super::lines::{self, LineFile, Refusal};
+use super::lines::{self, Claim, LineFile, Refusal};
 use crate::sampling::chain::{Chain, ChainError, MoveKind, Record, Shape};
 use crate::sampling::log_density::Status;
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, Visitor};
@@ -42,6 +42,15 @@ impl Journal {
         Ok(Journal { file: LineFile::create(path, replace)?, shape, lines: 0 })
     }
 
+    /// The same where its place was claimed before.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`], [`JournalError::Name`].
+    pub fn begin(claim: Claim, shape: Shape) -> Result<Self, JournalError> {
+        check_names(&shape)?;
+        Ok(Journal { file: claim.begin()?, shape, lines: 0 })
+    }
+
     /// Opens a journal to go on with it: reads the complete steps, and cuts the file after them.
     ///
     /// # Errors
@@ -80,10 +89,18 @@ impl Journal {
 /// # Errors
 /// [`JournalError::Io`]; [`JournalError::Line`] for anything wrong but a torn tail.
 pub fn read(path: &Path, shape: &Shape) -> Result<Chain, JournalError> {
+    Ok(read_to_end(path, shape)?.0)
+}
+
+/// The same, and whether the file ends with a whole step.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_to_end(path: &Path, shape: &Shape) -> Result<(Chain, bool), JournalError> {
     check_names(shape)?;
     let mut reader = StepReader::new(shape);
-    lines::read(path, &mut |line| reader.take(line))?;
-    Ok(reader.chain)
+    let is_whole = lines::read(path, &mut |line| reader.take(line))?;
+    Ok((reader.chain, is_whole))
 }
 
 /// Gathers lines into whole steps.

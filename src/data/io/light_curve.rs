@@ -9,7 +9,7 @@ use super::csv;
 use super::table::{self, NotText, Row, Table};
 use crate::surface::photometry::Flux;
 use columns::{Brightness, Columns};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 
 pub use zero_point::fitting;
@@ -25,6 +25,9 @@ const MAGNITUDES: [f64; 2] = [-30.0, 40.0];
 
 /// Where more than this share of the fluxes is 0 or below, they are no fluxes.
 const FEW: f64 = 0.1;
+
+/// An error smaller than the usual one by more than this is a mistake, and decides everything.
+const OUT_OF_PROPORTION: f64 = 1e3;
 
 /// Fluxes without a unit whose median is in this range, and most of which lie within so much, are magnitudes: fluxes
 /// are near 1, or counts by the hundred.
@@ -90,9 +93,11 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
         one_band(&columns, table.rows.iter().filter(is_used).map(|row| row.cell(band)))?;
     }
     let mut rows = Vec::new();
-    let (mut flagged, mut without) = (0, Vec::new());
+    let mut seen = HashSet::new();
+    let (mut flagged, mut without, mut copies) = (0, Vec::new(), Vec::new());
     for row in &table.rows {
         match numbers(row, &columns) {
+            Ok(numbers) if !seen.insert(numbers.map(f64::to_bits)) => copies.push(row.line),
             Ok(numbers) => rows.push(numbers),
             Err(Unused::Flagged) => flagged += 1,
             Err(Unused::Without(problem)) => without.push((row.line, problem)),
@@ -126,6 +131,10 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
              {problem}"
         ));
     }
+    if let Some(line) = copies.first() {
+        let (these, all) = (copies.len(), table.rows.len());
+        remarks.push(format!("{these} of {all} rows left out, copies of others, line {line} the first"));
+    }
     if let Some(flag) = columns.flag.filter(|_| flagged > 0) {
         let (name, all) = (columns.name(flag), table.rows.len());
         remarks.push(format!("{flagged} of {all} rows left out that the column {name} flags"));
@@ -135,6 +144,17 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
         values.sort_by(f64::total_cmp);
         values
     };
+    let sigmas = sorted(2);
+    let usual = sigmas[sigmas.len() / 2];
+    let too_sure = |row: &&Row| numbers(row, &columns).is_ok_and(|[_, _, sigma]| OUT_OF_PROPORTION * sigma < usual);
+    if let Some(row) = table.rows.iter().find(too_sure) {
+        let (name, cell) = (columns.name(columns.sigma), table::shown(row.cell(columns.sigma)));
+        let problem = format!(
+            "{name}: {cell} is less than a thousandth of the usual {usual:.1e}: it would outweigh all other rows. \
+             Correct it, or leave the row out"
+        );
+        return Err((row.line, problem));
+    }
     let values = sorted(1);
     let median = values[values.len() / 2];
     if columns.brightness == Brightness::Magnitude {

@@ -5,7 +5,7 @@
 //! is wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn
 //! tail. While a process writes such a file it holds a lock on it.
 
-use super::atomic;
+use super::atomic::{self, WriteError};
 use serde::Serialize;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
@@ -62,6 +62,15 @@ pub(super) struct Refusal {
     torn: bool,
 }
 
+impl From<JournalError> for WriteError {
+    fn from(error: JournalError) -> Self {
+        match error {
+            JournalError::Io { path, source } => WriteError { path, source },
+            error => WriteError { path: PathBuf::new(), source: std::io::Error::other(error) },
+        }
+    }
+}
+
 impl From<serde_json::Error> for Refusal {
     fn from(error: serde_json::Error) -> Self {
         let text = error.to_string();
@@ -99,6 +108,89 @@ pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
 /// Takes the lines one by one, without their ends; says whether a block is whole with this one.
 pub(super) type TakeLine<'a> = &'a mut dyn FnMut(&[u8]) -> Result<bool, Refusal>;
 
+/// A place for a file of lines that nobody else takes meanwhile, claimed before a long search for what it begins with.
+/// Unless it begins, file and folders that were made for it go again.
+#[derive(Debug)]
+pub struct Claim {
+    file: File,
+    path: PathBuf,
+    /// What was made for it, the innermost first.
+    made: Made,
+}
+
+/// Files and folders that go where nothing came of them.
+#[derive(Clone, Debug, Default)]
+struct Made {
+    file: Option<PathBuf>,
+    folders: Vec<PathBuf>,
+}
+
+impl Made {
+    /// A folder in which something is stays.
+    fn remove(&self) {
+        let is_empty = |path: &&PathBuf| path.metadata().is_ok_and(|file| file.len() == 0);
+        let _ = self.file.as_ref().filter(is_empty).map(std::fs::remove_file);
+        self.folders.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+    }
+}
+
+impl Claim {
+    /// Claims `path`, and makes its folder; a file that is there already is kept until [`Claim::begin`] if `replace`,
+    /// and refused otherwise.
+    ///
+    /// # Errors
+    /// [`JournalError::Locked`] where another process has it; [`JournalError::Io`].
+    pub fn of(path: &Path, replace: bool) -> Result<Self, JournalError> {
+        let folder = atomic::folder_of(path);
+        let absent = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        let folders: Vec<PathBuf> = folder.ancestors().take_while(absent).map(Path::to_owned).collect();
+        std::fs::create_dir_all(folder).map_err(at(folder))?;
+        let mut made = Made { file: None, folders };
+        let opened = match OpenOptions::new().read(true).write(true).create_new(true).open(path) {
+            Ok(file) => {
+                made.file = Some(path.to_owned());
+                lock(&file, path).map(|()| file)
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => match hold(path) {
+                Ok(Some(file)) if replace => Ok(file),
+                Err(error) => Err(error),
+                _ => Err(at(path)(error)),
+            },
+            Err(error) => Err(at(path)(error)),
+        };
+        match opened {
+            Ok(file) => Ok(Claim { file, path: path.to_owned(), made }),
+            Err(error) => {
+                made.remove();
+                Err(error)
+            }
+        }
+    }
+
+    /// What removes all trace of it, for whoever ends the program before it begins.
+    pub fn undo(&self) -> impl FnOnce() + Send + 'static {
+        let made = self.made.clone();
+        move || made.remove()
+    }
+
+    /// The file, emptied.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`].
+    pub fn begin(mut self) -> Result<LineFile, JournalError> {
+        self.file.set_len(0).map_err(at(&self.path))?;
+        let file = self.file.try_clone().map_err(at(&self.path))?;
+        self.made = Made::default();
+        Ok(LineFile { writer: BufWriter::new(file), path: self.path.clone() })
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        self.made.remove();
+    }
+}
+
 /// A file open for appending, locked against other processes until it is dropped.
 #[derive(Debug)]
 pub struct LineFile {
@@ -112,17 +204,7 @@ impl LineFile {
     /// # Errors
     /// [`JournalError::Io`] (the file is there already, for one), [`JournalError::Locked`].
     pub fn create(path: &Path, replace: bool) -> Result<Self, JournalError> {
-        let mut options = OpenOptions::new();
-        options.read(true).write(true);
-        if replace {
-            options.create(true)
-        } else {
-            options.create_new(true)
-        };
-        let file = options.open(path).map_err(at(path))?;
-        lock(&file, path)?;
-        file.set_len(0).map_err(at(path))?;
-        Ok(LineFile { writer: BufWriter::new(file), path: path.to_owned() })
+        Claim::of(path, replace)?.begin()
     }
 
     /// Opens a file to go on with it: hands its lines to `take`, and cuts it after the last whole block. It is only cut
@@ -154,10 +236,33 @@ impl LineFile {
     }
 }
 
-/// Hands the lines of a file to `take` and leaves it alone; it may be being written meanwhile.
-pub(super) fn read(path: &Path, take: TakeLine) -> Result<(), JournalError> {
+/// Hands the lines of a file to `take` and leaves it alone; it may be being written meanwhile. Whether it ends with a
+/// whole block.
+pub(super) fn read(path: &Path, take: TakeLine) -> Result<bool, JournalError> {
     let file = File::open(path).map_err(at(path))?;
-    scan(&mut BufReader::new(file), path, take).map(drop)
+    let whole = scan(&mut BufReader::new(&file), path, take)?;
+    Ok(file.metadata().is_ok_and(|file| file.len() == whole))
+}
+
+/// Makes a file, if there is none, and locks it as [`hold`] does.
+///
+/// # Errors
+/// As [`hold`].
+pub fn hold_for(path: &Path) -> Result<File, JournalError> {
+    let file = OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(at(path))?;
+    lock(&file, path).map(|()| file)
+}
+
+/// Locks a file against others that would write it, until it is dropped; `None` where there is no such file.
+///
+/// # Errors
+/// [`JournalError::Locked`]: another process writes it; [`JournalError::Io`].
+pub fn hold(path: &Path) -> Result<Option<File>, JournalError> {
+    match OpenOptions::new().read(true).write(true).open(path) {
+        Ok(file) => lock(&file, path).map(|()| Some(file)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(at(path)(error)),
+    }
 }
 
 /// The byte after the last whole block.

@@ -90,18 +90,29 @@ pub fn read_observations(list: &Path) -> Result<Observations, LsdError> {
 /// # Errors
 /// As [`read`].
 pub fn read_around(list: &Path, range_kms: Option<Range>) -> Result<ProfileSet, LsdError> {
-    read_listed(list, &list_bytes(list)?, range_kms)
+    read_listed(list, &list_bytes(list)?, range_kms, FEWEST)
 }
 
-/// Reads all profiles that a list of the content `bytes` names, which is or will be at `list`.
+/// The same of one of several data sets, which may be a single profile.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_listed(list: &Path, bytes: &[u8], range_kms: Option<Range>) -> Result<ProfileSet, LsdError> {
+pub fn read_one_of_several(list: &Path, range_kms: Option<Range>) -> Result<ProfileSet, LsdError> {
+    read_listed(list, &list_bytes(list)?, range_kms, 1)
+}
+
+/// Fewest profiles of a star.
+pub const FEWEST: usize = 2;
+
+/// Reads all profiles that a list of the content `bytes` names, `fewest` at least, which is or will be at `list`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_listed(list: &Path, bytes: &[u8], range_kms: Option<Range>, fewest: usize) -> Result<ProfileSet, LsdError> {
     let entries = parse_list(list, bytes)?;
     // a list that is none, a profile for one, is told of by what it names
     entries.iter().filter(|entry| !entry.path.exists()).try_for_each(|entry| read_profile(list, entry).map(drop))?;
-    times::check(&entries).map_err(|(line, problem)| FileError::Line { path: list.into(), line, problem })?;
+    times::check(&entries, fewest).map_err(|(line, problem)| FileError::Line { path: list.into(), line, problem })?;
     read_entries(list, bytes, entries, range_kms)
 }
 
@@ -206,13 +217,21 @@ fn no_text(what: NotText, Entry { path, .. }: &Entry) -> String {
     format!("is {what}; a profile is text, rows of velocity (km/s), I and sigma{cure}")
 }
 
+/// What a remark on a wild bin says.
+const WILD: &str = "errors away from its neighbours";
+
+/// Whether a remark tells of a wild bin, which may be why nothing fits.
+pub fn tells_of_wild_bin(remark: &str) -> bool {
+    remark.contains(WILD)
+}
+
 /// The profiles with a wild bin, a line each.
 fn wild(entries: &[Entry], profiles: &[Profile]) -> Vec<String> {
     let remark = |wild: wild::Wild| {
         let (entry, profile) = (&entries[wild.profile], &profiles[wild.profile]);
         format!(
-            "profile {} ({}, {:.4} d): the bin at {:.2} km/s is {:.0} errors away from its neighbours, a cosmic ray? \
-             Repair it, or leave the profile out",
+            "profile {} ({}, {:.4} d): the bin at {:.2} km/s is {:.0} {WILD}, a cosmic ray? Repair it, or leave the \
+             profile out",
             wild.profile + 1,
             shown(&entry.file),
             entry.time_d,

@@ -5,9 +5,10 @@ mod light;
 
 pub use light::LIGHT_CURVES;
 
-use super::atomic::{WriteError, write, write_json};
+use super::atomic::{WriteError, write, write_json, write_set};
 use super::csv::{DATA_SET, Table};
 use super::provenance::{MeasuredSet, Provenance, Season};
+use super::saved::{Saved, as_many};
 use crate::maxent::entropy::Entropy;
 use crate::model::ParameterValues;
 use crate::numerics::json::{Part, part};
@@ -201,6 +202,28 @@ pub struct FitFile {
     pub provenance: Provenance,
 }
 
+impl Saved for FitFile {}
+
+impl Saved for MapFile {
+    fn check(&self) -> Result<(), String> {
+        let n = self.pixels;
+        let columns = [
+            ("longitude_deg", &self.longitude_deg),
+            ("latitude_deg", &self.latitude_deg),
+            ("area_fraction", &self.area_fraction),
+        ];
+        columns.into_iter().try_for_each(|(key, column)| as_many(key, column.len(), n, "pixels"))?;
+        let in_rings = self.ring_pixels.iter().try_fold(0usize, |sum, ring| sum.checked_add(*ring)).unwrap_or(0);
+        as_many("ring_pixels", in_rings, n, "pixels")?;
+        if self.ring_pixels.contains(&0) || n == 0 {
+            return Err("ring_pixels: a ring without a pixel".into());
+        }
+        let maps = self.maps.iter().flat_map(|map| map.pixels.columns().into_iter().chain(&map.sigma_spot_filling));
+        let of_mean = self.mean.iter().flat_map(|mean| mean.pixels.columns());
+        maps.chain(of_mean).try_for_each(|column| as_many("maps", column.len(), n, "pixels"))
+    }
+}
+
 /// Columns that profiles have beside the others where there are several seasons or data sets, each with the number of
 /// each profile, from 1.
 fn beside(imager: &Imager) -> Vec<(&'static str, Vec<usize>)> {
@@ -210,6 +233,13 @@ fn beside(imager: &Imager) -> Vec<(&'static str, Vec<usize>)> {
 }
 
 impl MapColumns {
+    /// What there is of them.
+    fn columns(&self) -> Vec<&Vec<f64>> {
+        let (MapColumns::Spots { spot_filling: own, true_spot_filling: truth }
+        | MapColumns::BrightAndDark { brightness: own, true_brightness: truth }) = self;
+        std::iter::once(own).chain(truth).collect()
+    }
+
     fn of(entropy: Entropy, map: Vec<f64>, true_map: Option<Vec<f64>>) -> Self {
         match entropy {
             Entropy::Spots { .. } => MapColumns::Spots { spot_filling: map, true_spot_filling: true_map },
@@ -224,6 +254,10 @@ impl MapResult<'_> {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_set(folder, &|stage| self.fill(stage))
+    }
+
+    fn fill(&self, folder: &Path) -> Result<(), WriteError> {
         let [map, profiles, rv, fit] = FILES.map(|name| folder.join(name));
         write_json(&map, &self.map())?;
         write(&profiles, &self.profiles().into_bytes())?;

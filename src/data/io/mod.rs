@@ -12,6 +12,7 @@ pub mod lsd;
 pub mod map;
 pub mod paraboloid;
 pub mod provenance;
+pub mod saved;
 pub mod table;
 pub mod truth;
 pub mod zarr;

@@ -1,6 +1,7 @@
 //! The paraboloid of a landscape as a file: `paraboloid.json`, or in it why there is none.
 
 use super::atomic::{WriteError, write_json};
+use super::saved::{Saved, square};
 use crate::sampling::landscape::{Grid, Paraboloid, Rule, Undefined};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -20,6 +21,17 @@ pub struct ParaboloidFile {
     pub rule: Rule,
     /// Injected values, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
+}
+
+impl Saved for ParaboloidFile {
+    fn check(&self) -> Result<(), String> {
+        let Some(paraboloid) = &self.paraboloid else { return Ok(()) };
+        square("covariance", &paraboloid.covariance, self.names.len())?;
+        match self.names.iter().find(|name| !paraboloid.parameters.contains_key(*name)) {
+            Some(name) => Err(format!("parameters: missing {name}")),
+            None => Ok(()),
+        }
+    }
 }
 
 impl ParaboloidFile {

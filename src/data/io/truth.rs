@@ -2,6 +2,7 @@
 
 use super::atomic::{WriteError, write_json};
 use super::provenance::Provenance;
+use super::saved::{Saved, as_many};
 use crate::model::ParameterValues;
 use crate::star::Orbit;
 use crate::surface::nuisances::LineAndContinuum;
@@ -83,6 +84,23 @@ pub enum TruthFile {
     Simulated(Truth),
     /// Of observed profiles that an orbit was put into.
     Injected(InjectedTruth),
+}
+
+impl Saved for TruthFile {
+    fn check(&self) -> Result<(), String> {
+        let times = self.times_d().len();
+        let count = |key: &str, found: usize| as_many(key, found, times, "times_d");
+        match self {
+            TruthFile::Injected(truth) => count("velocity_kms", truth.velocity_kms.len()),
+            TruthFile::Simulated(truth) => {
+                let some = |key: &str, found: usize| if found == 0 { Ok(()) } else { count(key, found) };
+                some("continuum", truth.continuum.len())?;
+                some("zero_points_kms", truth.zero_points_kms.len())?;
+                some("coverage", truth.coverage.len())?;
+                count("orbit_kms", truth.orbit_kms.len())
+            }
+        }
+    }
 }
 
 impl TruthFile {

@@ -181,15 +181,19 @@ fn chain_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(vec![corner::figure(&sampled), trace::traces(&sampled), trace::autocorrelation(&sampled)])
 }
 
-/// Writes a figure into `folder` as SVG and PNG; the names of the files.
+/// Writes figures into `folder`, each as SVG and PNG; the names of the files.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(figure: &Figure, folder: &Path, dpi: f64) -> Result<[String; 2], WriteError> {
-    let names = names(figure);
-    atomic::write(&folder.join(&names[0]), figure.svg().as_bytes())?;
-    atomic::write(&folder.join(&names[1]), &figure.png(dpi))?;
-    Ok(names)
+pub fn write(figures: &[Figure], folder: &Path, dpi: f64) -> Result<Vec<String>, WriteError> {
+    atomic::write_set(folder, &|stage| {
+        figures.iter().try_for_each(|figure| {
+            let [svg, png] = names(figure).map(|name| stage.join(name));
+            atomic::write(&svg, figure.svg().as_bytes())?;
+            atomic::write(&png, &figure.png(dpi))
+        })
+    })?;
+    Ok(figures.iter().flat_map(names).collect())
 }
 
 /// The names of a figure's files.

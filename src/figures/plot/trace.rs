@@ -3,14 +3,13 @@
 use super::PlotError;
 use super::ephemeris::ephemeris;
 use super::symbols::{Shown, nearest_turn, symbol};
-use crate::data::io::journal;
 use crate::figures::drawing::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
 use crate::model::Prior;
 use crate::numerics::quantile::quantile;
 use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
-use crate::runs::run::CHAIN;
+use crate::runs::run::{CHAIN, read_chain};
 use crate::sampling::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::sampling::chain::statistics::unwrap_around;
 use crate::sampling::chain::{Chain, Goals, ParameterKind, Series};
@@ -43,7 +42,7 @@ impl Sampled {
     /// [`PlotError`]: no run there, or one that cannot be read.
     pub fn read(folder: &Path) -> Result<Self, PlotError> {
         let manifest = Manifest::read(folder)?;
-        let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
+        let chain = read_chain(folder, &manifest)?;
         let settings = manifest.settings(folder)?;
         let (kinds, goals) = kinds_and_goals(&settings);
         let priors = settings.free.iter().map(|f| f.prior).collect();

@@ -4,6 +4,7 @@ use crate::data::io::csv::Columns;
 use crate::data::io::lsd;
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::provenance::Measured;
+use crate::data::io::saved::Saved;
 use crate::figures::plot::PlotError;
 use crate::numerics::text::escaped;
 use crate::runs::origin;
@@ -25,6 +26,8 @@ pub(super) struct About {
     /// What the config leaves to the observations.
     pub measured: Measured,
 }
+
+impl Saved for About {}
 
 impl About {
     /// Of the result in `folder` that is known by `file`.

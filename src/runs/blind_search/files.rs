@@ -3,7 +3,7 @@
 
 use super::record::{FILE, PeriodogramFile};
 use super::search::BlindSearch;
-use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::{DATA_SET, Table};
 use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
@@ -42,6 +42,10 @@ impl BlindSearch<'_> {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_set(folder, &|stage| self.fill(stage))
+    }
+
+    fn fill(&self, folder: &Path) -> Result<(), WriteError> {
         let (velocities, covariance) = self.velocities();
         write(&folder.join("rv.csv"), &self.rv(&velocities, &covariance).into_bytes())?;
         write(&folder.join("covariance.csv"), matrix(&covariance).as_bytes())?;

@@ -3,6 +3,7 @@
 use super::quantities::QuantitiesRecord;
 use super::search::BlindSearch;
 use crate::data::io::provenance::Provenance;
+use crate::data::io::saved::Saved;
 use crate::inference::detection::{HeldOut, Robustness, WithoutNight};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{OrbitQuantities, ParameterValues};
@@ -75,6 +76,16 @@ pub struct PeriodogramFile {
     /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+impl Saved for PeriodogramFile {
+    fn check(&self) -> Result<(), String> {
+        let SearchRecord { min_period_d, max_period_d, .. } = self.search;
+        match min_period_d < max_period_d {
+            true => Ok(()),
+            false => Err("search.max_period_d: must be above min_period_d".into()),
+        }
+    }
 }
 
 /// A circular orbit.

@@ -15,6 +15,7 @@ pub use cost::{ChainCost, Cost, LandscapeCost};
 pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
+use crate::data::io::saved::Saved;
 use crate::model::Parameter;
 use crate::numerics::json::number_or_null;
 use crate::sampling::chain::statistics::wrap;
@@ -54,6 +55,15 @@ pub struct Comparison {
     pub versions: [String; 2],
     /// What to bear in mind.
     pub notes: Vec<String>,
+}
+
+impl Saved for Comparison {
+    fn check(&self) -> Result<(), String> {
+        match self.names.iter().find(|name| !self.parameters.contains_key(*name)) {
+            Some(name) => Err(format!("parameters: missing {name}")),
+            None => Ok(()),
+        }
+    }
 }
 
 /// One sampled parameter.

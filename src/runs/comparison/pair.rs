@@ -3,14 +3,13 @@
 
 use crate::data::config::{self, Config, Difference, Settings};
 use crate::data::io::effort::Effort;
-use crate::data::io::journal;
 use crate::data::io::landscape;
 use crate::data::io::lines::JournalError;
 use crate::model::Parameter;
 use crate::runs::grid_scan::{HEADER, Header, NODES};
 use crate::runs::manifest::Manifest;
 use crate::runs::origin::{Origin, OriginError};
-use crate::runs::run::CHAIN;
+use crate::runs::run::read_chain;
 use crate::sampling::chain::Chain;
 use crate::sampling::landscape::Landscape;
 use crate::surface::ObjectiveKind;
@@ -86,7 +85,7 @@ impl Pair {
             let (found, total) = (landscape.nodes().len(), header.grid.len());
             return Err(PairError::Unfinished { folder: grid.into(), found, total });
         }
-        let chain = journal::read(&run.join(CHAIN), &manifest.shape())?;
+        let chain = read_chain(run, &manifest)?;
         let efforts = [run, grid].map(Effort::read);
         let grid_objective = grid_settings.imaging.objective;
         Ok(Pair { manifest, settings, chain, header, grid_objective, landscape, efforts })

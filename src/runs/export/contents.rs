@@ -3,10 +3,9 @@
 //! Steps to be left out are those that `summary.json` leaves out.
 
 use super::ExportError;
-use crate::data::io::journal;
 use crate::model::{FreeParameter, Prior, Quoted};
 use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
-use crate::runs::run::CHAIN;
+use crate::runs::run::{CHAIN, read_chain};
 use crate::sampling::chain::{Chain, Settled, statistics::unwrap_around};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -84,7 +83,7 @@ impl Contents {
         let manifest = Manifest::read(run)?;
         let settings = manifest.settings(run)?;
         let path = run.join(CHAIN);
-        let chain = journal::read(&path, &manifest.shape())?;
+        let chain = read_chain(run, &manifest)?;
         let (kinds, _) = kinds_and_goals(&settings);
         let (summary, settled) = manifest
             .summarise(&settings, &chain)

@@ -9,7 +9,7 @@
 
 use super::draws::Draws;
 use super::{Contents, ExportError, Quantity};
-use crate::data::io::atomic::{self, WriteError};
+use crate::data::io::atomic::{self, WriteError, folder_of, write_set};
 use crate::surface::CHI2;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,6 +19,11 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// A file that cannot be written.
 pub fn write(contents: &Contents, root: &Path) -> Result<(), WriteError> {
+    let name = root.file_name().unwrap_or_default();
+    write_set(folder_of(root), &|stage| fill(contents, &stage.join(name)))
+}
+
+fn fill(contents: &Contents, root: &Path) -> Result<(), WriteError> {
     let draws = Draws::of(&contents.chain, contents.summary.discarded_steps..contents.chain.steps());
     let ensembles = contents.chain.shape().ensembles;
     for ensemble in 0..ensembles {
@@ -69,7 +74,7 @@ pub fn is_own(contents: &Contents, root: &Path, file: &Path) -> bool {
 /// # Errors
 /// [`ExportError::Place`] with the first such file.
 pub fn check_strangers(root: &Path, ensembles: usize) -> Result<(), ExportError> {
-    let folder = root.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(root);
     let Some(name) = root.file_name().and_then(|name| name.to_str()) else { return Ok(()) };
     let own = files(root, ensembles);
     let mut strangers: Vec<PathBuf> = std::fs::read_dir(folder)

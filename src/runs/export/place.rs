@@ -1,7 +1,7 @@
 //! Where an export goes: nothing that is there is lost unless it is an earlier export and the user insists.
 
 use super::ExportError;
-use crate::data::io::atomic::WriteError;
+use crate::data::io::atomic::{WriteError, clear_abandoned};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -39,11 +39,14 @@ pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> b
     Ok(())
 }
 
-/// Whether the folder can be written: it is not there yet, or it `is_own` and `replace`. Another folder is not
+/// Whether the folder can be written: it is not there yet, or empty, or it `is_own` and `replace`. Another one is not
 /// replaced, whatever the user says.
 pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
+    clear_abandoned(folder);
+    let is_empty = || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
     match folder.symlink_metadata() {
         Err(_) => Ok(()),
+        Ok(_) if is_empty() => Ok(()),
         Ok(_) if !is_own(folder) => wrong(folder, FOREIGN),
         Ok(_) if replace => Ok(()),
         Ok(_) => wrong(folder, TAKEN),

@@ -4,9 +4,10 @@
 use super::cells::{Cell, Limit, Orbits};
 use super::full::{Agreement, Comparison};
 use super::shortcut::Shortcut;
-use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
+use crate::data::io::saved::Saved;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::Search;
 use crate::planets::verdict::{CANDIDATE_FAP, decimals, false_alarm, probability, speed};
@@ -51,6 +52,19 @@ pub struct LimitsFile {
     /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+impl Saved for LimitsFile {
+    fn check(&self) -> Result<(), String> {
+        match () {
+            () if self.limits.is_empty() => Err("limits: empty, one period at least is due".into()),
+            () if self.k_kms.is_empty() || self.k_kms.iter().any(|k| *k <= 0.0) => {
+                Err("k_kms: must be above 0, one at least".into())
+            }
+            () if self.phases == 0 => Err("phases: must be above 0".into()),
+            () => Ok(()),
+        }
+    }
 }
 
 /// The highest peak.
@@ -148,8 +162,11 @@ impl LimitsFile {
             let counts = [cell.phases, cell.detected, cell.recovered].map(|n| n as f64);
             table.row(&[&[period_d, cell.porb_over_prot, cell.k_kms][..], &counts].concat());
         }
-        write(&folder.join(CSV), &table.into_bytes())?;
-        write_json(&folder.join(JSON), self)
+        let table = table.into_bytes();
+        write_set(folder, &|stage| {
+            write(&stage.join(CSV), &table)?;
+            write_json(&stage.join(JSON), self)
+        })
     }
 
     /// A table of some of the periods, and what may be wrong.

@@ -1,9 +1,10 @@
 //! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
 
 use super::{Campaign, Expected, Outlook, PlanSettings, SpotsSource};
-use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
+use crate::data::io::saved::Saved;
 use crate::numerics::text::{aligned, escaped};
 use crate::planets::verdict::CANDIDATE_FAP;
 use serde::{Deserialize, Serialize};
@@ -36,6 +37,20 @@ pub struct PlanFile {
     /// Config of the first, times and program.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+impl Saved for PlanFile {
+    fn check(&self) -> Result<(), String> {
+        let all = self.schedules.len();
+        match () {
+            () if all == 0 => Err("schedules: empty, a plan has one at least".into()),
+            () if !(1..=all).contains(&self.best) => Err(format!("best: {} must be from 1 to {all}", self.best)),
+            () if !(self.range_d[0] > 0.0 && self.range_d[0] < self.range_d[1]) => {
+                Err("range_d: must rise, and be above 0".into())
+            }
+            () => Ok(()),
+        }
+    }
 }
 
 /// A schedule.
@@ -159,8 +174,11 @@ impl PlanFile {
                 table.row(&[&[(k + 1) as f64, period_d, porb_over_prot][..], &numbers].concat());
             }
         }
-        write(&folder.join(CSV), &table.into_bytes())?;
-        write_json(&folder.join(JSON), self)
+        let table = table.into_bytes();
+        write_set(folder, &|stage| {
+            write(&stage.join(CSV), &table)?;
+            write_json(&stage.join(JSON), self)
+        })
     }
 
     /// The best schedule.

@@ -61,7 +61,7 @@ impl Forecast {
         let compared = compared_d(&campaigns, range);
         let one = |campaign: Campaign| {
             report(&campaign.name);
-            let outlooks = outlook(&campaign, range, settings).map_err(|error| match error {
+            let outlooks = outlook(&campaign, range, settings, report).map_err(|error| match error {
                 PlanError::Frequencies(error) => frequencies(error),
                 error => error.into(),
             })?;

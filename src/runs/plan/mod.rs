@@ -23,9 +23,13 @@ use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings
 use crate::surface::expansion::nuisances;
 use crate::surface::planned::Planned;
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
 /// Periods over which schedules are compared, even in their logarithm.
 const COMPARED: usize = 60;
+
+/// Profiles of the largest campaign: some minutes, and 1 GB.
+const MOST_PROFILES: usize = 1000;
 
 /// How often the growing campaign is looked at.
 const LOOKS: usize = 6;
@@ -54,6 +58,17 @@ pub enum PlanError {
         /// What is wrong.
         source: FieldError,
     },
+    /// More profiles than can be looked at in reasonable time and memory.
+    #[error(
+        "{name}: {profiles} profiles; time and memory of a plan grow with their square, and {MOST_PROFILES} are the \
+        most: fewer --nights, or fewer exposures per_night"
+    )]
+    TooLong {
+        /// The schedule.
+        name: String,
+        /// How many.
+        profiles: usize,
+    },
     /// Periods that make no sense, or too few profiles.
     #[error(transparent)]
     Frequencies(#[from] FrequencyError),
@@ -73,11 +88,22 @@ pub fn range_d(campaigns: &[Campaign], wanted: FrequencySettings) -> Result<[f64
     Ok(range)
 }
 
-/// What a campaign comes to, searched from the shortest to the longest period of `range_d`.
+/// What a campaign comes to, searched from the shortest to the longest period of `range_d`. `report` is told how far it
+/// is.
 ///
 /// # Errors
 /// [`PlanError`].
-pub fn outlook(campaign: &Campaign, range_d: [f64; 2], settings: &PlanSettings) -> Result<Vec<Outlook>, PlanError> {
+pub fn outlook(
+    campaign: &Campaign,
+    range_d: [f64; 2],
+    settings: &PlanSettings,
+    report: &dyn Fn(&str),
+) -> Result<Vec<Outlook>, PlanError> {
+    let profiles = campaign.all().len();
+    if profiles > MOST_PROFILES {
+        return Err(PlanError::TooLong { name: campaign.name.clone(), profiles });
+    }
+    let began = Instant::now();
     let field = |source| PlanError::Field { name: campaign.name.clone(), source };
     let nuisances = if settings.fixed { Vec::new() } else { nuisances(&campaign.settings.free) };
     let values = campaign.settings.values;
@@ -103,6 +129,9 @@ pub fn outlook(campaign: &Campaign, range_d: [f64; 2], settings: &PlanSettings) 
         for (all, one) in quadratics.iter_mut().zip(planned.velocities(&maps, &parts).map_err(field)?) {
             all.push(one);
         }
+        let (done, all) = (k + 1, settings.maps.max(1));
+        let left = began.elapsed().as_secs_f64() * (all - done) as f64 / done as f64;
+        report(&format!("{}: {profiles} profiles, map {done} of {all}, some {left:.0} s left", campaign.name));
     }
     let outlook = |((nights, part, frequencies), quadratics): ((usize, Vec<usize>, Frequencies), Vec<_>)| {
         Outlook::new(nights, part.len(), quadratics, frequencies, settings)

@@ -1,8 +1,7 @@
 //! What is said of a run once it has ended, or meanwhile: its summary, and the text that goes with it.
 
-use super::{CHAIN, RunError, SUMMARY};
+use super::{CHAIN, RunError, SUMMARY, read_chain};
 use crate::data::io::atomic::write_json;
-use crate::data::io::journal;
 use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
 use crate::sampling::chain::statistics::unwrap_around;
 use crate::sampling::chain::{Chain, ParameterKind, Settled};
@@ -26,7 +25,7 @@ impl Conclusion {
     /// No run there, or one that is broken.
     pub fn read(folder: &Path) -> Result<(Self, Chain), RunError> {
         let manifest = Manifest::read(folder)?;
-        let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
+        let chain = read_chain(folder, &manifest)?;
         Ok((Conclusion::of(folder, &manifest, &chain)?, chain))
     }
 

@@ -13,9 +13,10 @@ pub use error::RunError;
 pub use pace::{Cost, Meter, Pace};
 
 use crate::data::config::Settings;
+use crate::data::io::atomic::clear_abandoned;
 use crate::data::io::effort::Effort;
 use crate::data::io::journal::{self, Journal, JournalError};
-use crate::data::io::lines;
+use crate::data::io::lines::{self, Claim};
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::runs::blind_search::{BlindSearch, SearchSummary};
@@ -40,6 +41,42 @@ pub const SUMMARY: &str = "summary.json";
 /// Whether nothing but an empty chain is in `folder`, and with `manifest` perhaps that: such a run may begin again.
 pub fn is_false_start(folder: &Path, manifest: bool) -> bool {
     lines::is_false_start(folder, manifest.then_some(manifest::FILE), CHAIN)
+}
+
+/// Reads the chain of the run in `folder`, which may be being written meanwhile, and checks it as a whole.
+///
+/// # Errors
+/// Those of [`journal::read`]; draws that the priors exclude; a chain that is shorter than it was.
+pub fn read_chain(folder: &Path, manifest: &Manifest) -> Result<Chain, JournalError> {
+    let path = folder.join(CHAIN);
+    let (chain, is_whole) = journal::read_to_end(&path, &manifest.shape())?;
+    within_priors(&path, manifest, &chain)?;
+    let cut = |problem: String| {
+        let line = chain.records().len() + 1;
+        Err(JournalError::Line { path: path.clone(), line, problem })
+    };
+    if !manifest.merged_seeds.is_empty() && !is_whole {
+        return cut("ends within a step, and a merged run does not grow: merge the runs again".into());
+    }
+    #[derive(serde::Deserialize)]
+    struct Before {
+        steps: usize,
+    }
+    let before = std::fs::read(folder.join(SUMMARY)).ok().and_then(|text| serde_json::from_slice(&text).ok());
+    match (before, chain.steps().checked_sub(1)) {
+        (Some(Before { steps }), Some(last)) if last < steps => cut(format!(
+            "the chain ends with step {last}, {SUMMARY} is of {steps}: the end is missing. Copy it again, or delete \
+            {SUMMARY}"
+        )),
+        _ => Ok(chain),
+    }
+}
+
+fn within_priors(path: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), JournalError> {
+    match manifest.outside(chain) {
+        None => Ok(()),
+        Some((line, problem)) => Err(JournalError::Line { path: path.into(), line, problem }),
+    }
 }
 
 /// Where the walkers start.
@@ -125,7 +162,7 @@ impl Run {
     /// No run there, or one that is broken.
     pub fn read(folder: &Path) -> Result<(Chain, RunSummary), RunError> {
         let manifest = Manifest::read(folder)?;
-        let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
+        let chain = read_chain(folder, &manifest)?;
         let (summary, _) = manifest.summarise(&manifest.settings(folder)?, &chain)?;
         Ok((chain, summary))
     }
@@ -176,9 +213,27 @@ impl Run {
     /// A folder that holds a run already or cannot be written.
     #[doc(hidden)]
     pub fn kept_in(self, folder: &Path, replace: bool) -> Result<Self, RunError> {
-        std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
+        self.kept_by(Run::claim(folder, replace)?, folder)
+    }
+
+    /// Claims `folder`, which is made, for a run that is yet to be found: others are refused from now on.
+    ///
+    /// # Errors
+    /// A folder that holds a run already (unless `replace`), in which another process begins one, or that cannot be
+    /// written.
+    #[doc(hidden)]
+    pub fn claim(folder: &Path, replace: bool) -> Result<Claim, RunError> {
+        Ok(Claim::of(&folder.join(CHAIN), replace)?)
+    }
+
+    /// As [`Run::kept_in`], in the folder of a claim.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    #[doc(hidden)]
+    pub fn kept_by(self, claim: Claim, folder: &Path) -> Result<Self, RunError> {
         // the chain first: whoever holds it may write the manifest
-        let mut journal = Journal::create(&folder.join(CHAIN), self.manifest.shape(), replace)?;
+        let mut journal = Journal::begin(claim, self.manifest.shape())?;
         match std::fs::remove_file(folder.join(SUMMARY)) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(RunError::Folder { path: folder.join(SUMMARY), source });
@@ -202,7 +257,10 @@ impl Run {
             return Err(RunError::Merged(folder.into()));
         }
         manifest.origin.check(scene, folder)?;
-        let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
+        clear_abandoned(folder);
+        let path = folder.join(CHAIN);
+        let (mut journal, mut chain) = Journal::recover(&path, manifest.shape())?;
+        within_priors(&path, &manifest, &chain)?;
         let posterior = manifest.origin.posterior(scene, scene.space.clone(), folder)?;
         let target = Target::new(posterior, scene.settings.imaging.unresolved_spots)?;
         let task = Task::new(scene, &manifest.origin, scene.space.names(), Asked::LogProbability);

@@ -7,6 +7,7 @@ use super::rates::{RateRecord, rates};
 use super::star::Star;
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::{Table, quoted};
+use crate::data::io::saved::Saved;
 use crate::numerics::text::{Align, columns, escaped};
 use crate::planets::occurrence::RatePrior;
 use crate::planets::verdict::{Finding, probability};
@@ -51,6 +52,29 @@ pub struct SurveyFile {
     pub warnings: Vec<String>,
     /// Version of the program.
     pub version: String,
+}
+
+impl Saved for SurveyFile {
+    fn check(&self) -> Result<(), String> {
+        let boxes = self.boxes.len();
+        let is_box =
+            |of: &BoxRecord| of.period_d[0] < of.period_d[1] && (of.k_kms.is_some() != of.msini_mjup.is_some());
+        let is_whole = |star: &StarRecord| star.completeness.len() == boxes && star.false_alarms.len() == boxes;
+        match () {
+            () if boxes == 0 => Err("boxes: empty, one at least is due".into()),
+            () if !self.boxes.iter().all(is_box) => Err("boxes: period_d must rise, with k_kms or msini_mjup".into()),
+            () if !self.stars.iter().all(is_whole) => {
+                Err(format!("stars: completeness and false_alarms must have {boxes} numbers each, one for each box"))
+            }
+            () if !self.rates.iter().all(|of| (1..=boxes).contains(&of.planets)) => {
+                Err(format!("rates: box must be from 1 to {boxes}"))
+            }
+            () if !self.rates.iter().all(|of| of.rate.len() == of.density.len() && !of.rate.is_empty()) => {
+                Err("rates: rate and density must have the same number of values, one at least".into())
+            }
+            () => Ok(()),
+        }
+    }
 }
 
 /// A box of planets.

@@ -7,6 +7,7 @@ use super::star::Star;
 use crate::data::config::first_difference;
 use crate::data::io::FileError;
 use crate::data::io::csv::Columns;
+use crate::data::io::saved::Saved;
 use crate::planets::occurrence::Completeness;
 use crate::planets::verdict::{Finding, Verdict};
 use crate::runs::limits::{self, LimitsFile};
@@ -61,6 +62,10 @@ struct ChainPart {
     #[serde(default)]
     config: Value,
 }
+
+impl Saved for SearchPart {}
+
+impl Saved for ChainPart {}
 
 #[derive(Deserialize)]
 struct VerdictPart {

@@ -87,6 +87,9 @@ pub(super) fn check_windows(windows: &[[f64; 2]], key: &str) -> Result<(), Fault
     Ok(())
 }
 
+/// Endings of the files that are written beside folders of such names.
+const FILES: [&str; 4] = [".json", ".csv", ".txt", ".prof"];
+
 /// Names are folders and files of `simulate`, and labels: of things that stand at these keys and have these names.
 pub(super) fn names(all: &[(&str, &str)]) -> Result<(), Fault> {
     for (s, (key, name)) in all.iter().enumerate() {
@@ -95,6 +98,11 @@ pub(super) fn names(all: &[(&str, &str)]) -> Result<(), Fault> {
         if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) || name.starts_with('.') {
             let problem = format!("{name:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'");
             return fault(problem);
+        }
+        if let Some(ending) = FILES.iter().find(|ending| name.to_ascii_lowercase().ends_with(**ending)) {
+            return fault(format!(
+                "{name:?} ends like a file, and names a folder or the file {name}.csv: leave {ending} out"
+            ));
         }
         if let Some((other, _)) = all[..s].iter().find(|(_, other)| other.eq_ignore_ascii_case(name)) {
             return fault(format!("{name:?} is the name of {other} already: each needs its own"));

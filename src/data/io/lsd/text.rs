@@ -34,6 +34,9 @@ const LARGEST: f64 = 1e6;
 /// Errors larger than the usual one by this mark the ends of a profile as no data.
 const WEIGHTLESS: f64 = 100.0;
 
+/// An error smaller than the usual one by more than this is a mistake, and decides everything.
+const OUT_OF_PROPORTION: f64 = 1e3;
+
 /// Fewest bins that make a profile.
 pub(super) const MIN_BINS: usize = 5;
 
@@ -103,7 +106,16 @@ pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
     }
     let mut sigmas: Vec<f64> = good.iter().map(|j| rows[*j].sigma).collect();
     sigmas.sort_by(f64::total_cmp);
-    let most = WEIGHTLESS * sigmas[sigmas.len() / 2];
+    let usual = sigmas[sigmas.len() / 2];
+    let too_sure = |(_, row): &(usize, &Row)| row.bad.is_none() && OUT_OF_PROPORTION * row.sigma < usual;
+    profile.bad.extend(rows.iter().enumerate().filter(too_sure).map(|(j, row)| {
+        let problem = format!(
+            "sigma {:e} is less than a thousandth of the usual {usual:.1e}: it would outweigh all other bins",
+            row.sigma
+        );
+        (j, Fault { line: row.line, problem })
+    }));
+    let most = WEIGHTLESS * usual;
     let weightless = |row: &&Row| row.bad.is_some() || row.sigma > most;
     let start = rows.iter().take_while(weightless).count();
     profile.weighty = start..rows.len() - rows[start..].iter().rev().take_while(weightless).count();

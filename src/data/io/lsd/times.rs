@@ -29,13 +29,13 @@ const SECONDS_PER_DAY: f64 = 86_400.0;
 /// What is wrong with a list, and in which line.
 pub(super) type Fault = (usize, String);
 
-/// Checks times and velocities, and that no file stands there twice.
+/// Checks times and velocities, that there are `fewest` at least, and that no file stands there twice.
 ///
 /// # Errors
 /// The first line at fault, with the likely cure.
-pub(super) fn check(entries: &[Entry]) -> Result<(), Fault> {
+pub(super) fn check(entries: &[Entry], fewest: usize) -> Result<(), Fault> {
     entries.iter().try_for_each(of_sense)?;
-    if let [only] = entries {
+    if let ([only], 2..) = (entries, fewest) {
         let problem = "the only profile of the list: spots and RVs differ only in their variation, list two or more";
         return Err((only.line, problem.into()));
     }

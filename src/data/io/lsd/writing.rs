@@ -2,7 +2,7 @@
 
 use super::error::LsdError;
 use super::list::Label;
-use crate::data::io::atomic;
+use crate::data::io::atomic::{self, WriteError};
 use crate::star::observation::{Observations, Profile};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub fn is_written(name: &str) -> bool {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
+pub fn write(folder: &Path, observations: &Observations) -> Result<(), WriteError> {
     let mut list = String::from("# file  time_d\n");
     for (k, profile) in observations.profiles.iter().enumerate() {
         let name = format!("p{k:03}.prof");
@@ -43,7 +43,7 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError>
 pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
     let label = |k: usize| Label { file: format!("profile {k}"), path: None, vrad_kms: 0.0 };
     let labels: Vec<Label> = (0..observations.profiles.len()).map(label).collect();
-    write_as(folder, observations, &labels, "from arrays")
+    Ok(write_as(folder, observations, &labels, "from arrays")?)
 }
 
 /// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity
@@ -51,7 +51,7 @@ pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), L
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], what: &str) -> Result<(), LsdError> {
+pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], what: &str) -> Result<(), WriteError> {
     let mut list = String::from("# file  time_d  vrad_kms\n");
     for (k, (profile, Label { file, vrad_kms, .. })) in observations.profiles.iter().zip(labels).enumerate() {
         let name = format!("p{k:03}.prof");
@@ -72,6 +72,6 @@ fn profile_text(title: &str, profile: &Profile, vrad_kms: f64) -> String {
     text
 }
 
-fn save(path: &Path, text: &str) -> Result<(), LsdError> {
-    Ok(atomic::write(path, text.as_bytes())?)
+fn save(path: &Path, text: &str) -> Result<(), WriteError> {
+    atomic::write(path, text.as_bytes())
 }

@@ -9,7 +9,7 @@ mod loss;
 use super::ExportError;
 use super::place::{begins_with, check_folder, check_name, create_parent};
 use crate::data::io::FileError;
-use crate::data::io::atomic::{self, WriteError};
+use crate::data::io::atomic::{self, WriteError, write_set};
 use crate::data::io::csv::{Columns, DATA_SET};
 use crate::runs::blind_search::{FILE, PeriodogramFile};
 use crate::runs::origin;
@@ -65,13 +65,10 @@ pub fn write(folder: &Path, out: &Path, replace: bool) -> Result<Vec<PathBuf>, E
         (COVARIANCE, velocities.covariance_m2s2()),
         (LIKELIHOOD, include_str!("rv_likelihood.py").to_owned()),
     ];
-    let mut written = Vec::new();
-    for (name, text) in files {
-        let file = out.join(name);
-        atomic::write(&file, text.as_bytes())?;
-        written.push(file);
-    }
-    Ok(written)
+    write_set(out, &|stage| {
+        files.iter().try_for_each(|(name, text)| atomic::write(&stage.join(name), text.as_bytes()))
+    })?;
+    Ok(files.iter().map(|(name, _)| out.join(name)).collect())
 }
 
 impl Velocities {
@@ -79,11 +76,13 @@ impl Velocities {
         let path = folder.join("rv.csv");
         let table = Columns::read(&path)?;
         let (times_d, kms) = (table.column("time_d")?.to_vec(), table.column("rv_kms")?.to_vec());
-        let covariance = matrix(&folder.join("covariance.csv"), times_d.len())?;
+        let path_of_matrix = folder.join("covariance.csv");
+        let covariance = matrix(&path_of_matrix, times_d.len())?;
         if !kms.iter().chain(covariance.as_slice()).all(|x| x.is_finite()) {
             let problem = "the profiles do not bound all velocities: there is nothing to pass on";
             return Err(FileError::of(&path, problem).into());
         }
+        positive(&covariance).map_err(|(line, problem)| FileError::Line { path: path_of_matrix, line, problem })?;
         let names: Vec<&String> = search.provenance.measured.sets.iter().map(|set| &set.name).collect();
         let name = |number: &f64| names.get((*number as usize).saturating_sub(1)).map(|name| (*name).clone());
         let sets = table.column(DATA_SET).ok().and_then(|column| column.iter().map(name).collect());
@@ -139,6 +138,41 @@ fn matrix(path: &Path, n: usize) -> Result<DMatrix<f64>, FileError> {
     match numbers.len() == n * n {
         true => Ok(DMatrix::from_row_slice(n, n, &numbers)),
         false => Err(FileError::of(path, format!("{} lines instead of {n}, one for each velocity", numbers.len() / n))),
+    }
+}
+
+/// Rounding of a covariance, relative to its largest numbers.
+const ROUNDING: f64 = 1e-9;
+
+/// That a covariance is one: variances above 0, the same above and below the diagonal, no direction of negative
+/// variance. What is wrong has its line.
+fn positive(covariance: &DMatrix<f64>) -> Result<(), (usize, String)> {
+    let variance = |k: usize| covariance[(k, k)];
+    let cure = "is this file as `dimcmc periodogram` wrote it? Run the search again";
+    for k in 0..covariance.nrows() {
+        if variance(k) <= 0.0 {
+            return Err((
+                k + 1,
+                format!("the variance of velocity {} is {:e}, not above 0: {cure}", k + 1, variance(k)),
+            ));
+        }
+        let far = |j: &usize| {
+            let scale = (variance(k) * variance(*j)).sqrt();
+            (covariance[(k, *j)] - covariance[(*j, k)]).abs() > ROUNDING * scale
+        };
+        if let Some(j) = (0..k).find(far) {
+            let problem = format!("number {} differs from number {} of line {}: {cure}", j + 1, k + 1, j + 1);
+            return Err((k + 1, problem));
+        }
+    }
+    // of correlations, so that all directions count alike
+    let correlation = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |j, k| {
+        covariance[(j, k)] / (variance(j) * variance(k)).sqrt()
+    });
+    let lowest = correlation.symmetric_eigenvalues().min();
+    match lowest < -1e3 * ROUNDING {
+        true => Err((1, format!("no covariance: a direction has a variance below 0 ({lowest:.1e}): {cure}"))),
+        false => Ok(()),
     }
 }
 
