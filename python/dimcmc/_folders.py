@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from . import _core
-from ._functions import _by_keyword, _folder, _threads
+from ._functions import _folder, _threads
 from ._progress import shown
 from ._results import (
     Comparison,
@@ -248,6 +248,6 @@ def survey(
     texts = [[f"{p[0]}:{p[1]},{s[0]}:{s[1]}" for p, s in some] for some in (boxes, mass_boxes)]
     path = None if table is None else os.fspath(table)
     options = (texts[0], texts[1], prior == "jeffreys", path, group, reliability)
-    with _folder(out, force) as (folder, scratch), shown("survey", progress) as show, _by_keyword():
+    with _folder(out, force) as (folder, scratch), shown("survey", progress) as show:
         said = _core.survey(folders, options, os.fspath(folder), (_threads(threads), show))
     return Survey(folder, said, scratch)
