@@ -100,8 +100,8 @@ impl EvidenceRecord {
         });
         let jitter = if !jitters.is_none() { ", RV jitter marginalised" } else { "" };
         let sentence = format!(
-            "{}ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (not used in the verdict; priors: \
-            {priors}; spots fixed at the planet-free fit{jitter})",
+            "{}ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (not used \
+            in the verdict; priors: {priors}; spots fixed at the planet-free fit{jitter})",
             wide.unwrap_or_default(),
             number(&circle),
             number(&ellipse),

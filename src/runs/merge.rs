@@ -121,7 +121,7 @@ impl Merged {
         }
         match std::fs::remove_file(folder.join(SUMMARY)) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(WriteError { path: folder.join(SUMMARY), source }.into());
+                Err(WriteError { path: folder.join(SUMMARY), source }.into())
             }
             _ => Ok(write_set(folder, &|stage| self.fill(stage))?),
         }

@@ -3,7 +3,8 @@
 //! In: a scene (`data::scene`), or a folder that an earlier command wrote. Out: files of a folder.
 //!
 //! 1. [`pool`] spreads evaluations over threads, or over the ranks of a `cluster`.
-//! 2. [`mod@fitted`] is what the profiles say of the star, kept for the next command; [`origin`] and [`manifest`] are what a folder was begun with.
+//! 2. [`mod@fitted`] is what the profiles say of the star, kept for the next command; [`origin`] and [`manifest`] are
+//!    what a folder was begun with.
 //! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`maps`] the star there,
 //!    [`simulated`] what it was made with; [`blind_search`] and [`limits`] are searches for orbits,
 //!    [`detection_limits`] carries out the latter, [`injected`] puts an orbit into profiles, [`plan`] is what profiles

@@ -223,7 +223,7 @@ fn groups_and_reliabilities_come_from_a_table() {
     let svg = desk.read("survey/figures/rates.svg");
     assert_eq!(paths(&svg, "rate").len(), 3);
     assert!(texts(&svg).iter().any(|text| text.starts_with("young, 2 stars")), "{:?}", texts(&svg));
-    assert!(texts(&desk.read("survey/figures/completeness.svg")).iter().any(|text| *text == "Star 1"));
+    assert!(texts(&desk.read("survey/figures/completeness.svg")).contains(&"Star 1"));
     desk.write("stars.csv", "name,age\nStar 1,young\nStar 3,old\nStar 5,old\n");
     let refused = |options: &[&str]| desk.refusal(&[&["survey", "stars", "--out", "x"], options].concat());
     says(

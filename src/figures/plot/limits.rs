@@ -155,5 +155,5 @@ fn above(values: &[f64]) -> f64 {
 
 const CAPTION: &str = "Detection limits. Colour: share of the phases at which an orbit of that period and \
 semi-amplitude K, injected into the profiles, is recovered: the blind search finds its period with FAP < 1 %. Lines: K \
-recovered at 50 and 95 % of the phases. Diamond: detected signal, subtracted before the injections. Points: orbits recovered or missed \
-by the full pipeline, with resampled profiles. Dotted: the rotation period and its fractions.";
+recovered at 50 and 95 % of the phases. Diamond: detected signal, subtracted before the injections. Points: orbits \
+recovered or missed by the full pipeline, with resampled profiles. Dotted: the rotation period and its fractions.";
