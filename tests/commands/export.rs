@@ -268,6 +268,7 @@ fn what_cannot_be_exported_is_refused() {
         says(&text(&output.stderr), &["error: ", "--format <FORMAT>"]);
     }
     says(&text(&dimcmc(&["export", "run", "--format", "fits"], &desk.path("")).stderr), &["zarr, emcee, getdist, csv"]);
+    std::fs::remove_file(desk.path("run/summary.json")).unwrap();
     let chain = desk.read("run/chain.jsonl");
     let step: String = chain.lines().take(ENSEMBLES * WALKERS).map(|line| format!("{line}\n")).collect();
     let whole =
@@ -295,6 +296,8 @@ fn what_cannot_be_exported_is_refused() {
 #[test]
 fn a_run_may_grow_meanwhile() {
     let desk = small();
+    // a chain that has ended would be cut
+    std::fs::remove_file(desk.path("run/summary.json")).unwrap();
     let chain = desk.read("run/chain.jsonl");
     let (size, whole) = (ENSEMBLES * WALKERS, steps(&desk));
     let ends: Vec<usize> = chain.match_indices('\n').map(|(k, _)| k + 1).collect();

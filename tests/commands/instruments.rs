@@ -29,7 +29,14 @@ fn each_list_has_its_spectrograph() {
     let desk = desk();
     let list = desk.read("data/observations.txt");
     std::fs::create_dir(desk.path("second")).unwrap();
-    desk.write("second/observations.txt", &list.replace("p0", "../data/p0"));
+    // the same profiles an hour later: none is in both lists
+    let later = |line: &str| match line.split_once(' ') {
+        Some((file, time)) if file.starts_with('p') => {
+            format!("../data/{file} {}\n", time.trim().parse::<f64>().unwrap() + 0.04)
+        }
+        _ => format!("{line}\n"),
+    };
+    desk.write("second/observations.txt", &list.lines().map(later).collect::<String>());
     let both = ["init", "data/observations.txt", "second/observations.txt"];
     let star = ["--rotation-period", "3", "--inclination", "50", "--pixels", "300"];
     let named = ["--instrument", "narval,HARPSpol", "--wavelength", "600"];
