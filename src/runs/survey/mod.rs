@@ -1,7 +1,7 @@
 //! Many stars together: the completeness of a sample, and the rate of planets in it.
 //!
-//! In: folders of searches and of detection limits. [`folders`] matches them star by star, [`star`] is one star with
-//! both, [`table`] has what a table says of the stars. Out: [`file`]'s `survey.csv`, `completeness.csv`, `survey.json`.
+//! In: folders of searches and of detection limits. `folders` matches them star by star, `star` is one star with
+//! both, `table` has what a table says of the stars. Out: [`file`]'s `survey.csv`, `completeness.csv`, `survey.json`.
 //! The statistics are in `planets::occurrence`.
 
 mod boxes;
