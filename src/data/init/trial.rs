@@ -15,7 +15,7 @@ use crate::model::Parameter;
 use crate::star::BrightnessModel;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::star::MeasuredStar;
-use crate::surface::{NoMaps, ReferenceError, SurfaceMaps};
+use crate::surface::{NoMaps, OtherRotation, ReferenceError, SurfaceMaps};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -162,7 +162,11 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
         trial.diagnosis = Diagnosis::at_sight(&scene).filter(|seen| seen.reason == Reason::DoubleLines);
     }
     trial.star = scene.measured.star.as_ref().map(MeasuredStar::line);
-    trial.warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().collect();
+    // a second star makes another rotation period look better
+    let is_double = trial.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.reason == Reason::DoubleLines);
+    let rotation = scene.measured.other_rotation.as_ref().filter(|_| is_double).map(OtherRotation::sentence);
+    let warnings = maps.warnings.iter().chain(&maps.checks.warnings);
+    trial.warnings = warnings.filter(|text| Some(*text) != rotation.as_ref()).cloned().collect();
     let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());
     let of = if used < all { format!("{used} of the {all}") } else { format!("the {all}") };
     let spots = field.map_or_else(String::new, |field| {
