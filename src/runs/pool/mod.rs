@@ -60,6 +60,11 @@ impl Pool {
         }
     }
 
+    /// Whether other processes work, too, and may end the job.
+    pub fn is_of_ranks(&self) -> bool {
+        !matches!(self.workers, Workers::Threads)
+    }
+
     /// Set from outside to stop.
     pub fn stop(&self) -> &AtomicBool {
         &self.stop
