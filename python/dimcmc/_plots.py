@@ -218,7 +218,7 @@ def _velocities(result: Result, numbers: Arrays, axes: Any) -> None:
     if moments[0] not in numbers:
         moments = ("observed_kms", "sigma_kms")
     clean = ("rv_kms", "rv_sigma_kms") if "rv_kms" in numbers else ("filtered_kms", "sigma_kms")
-    for panel, (rv, sigma), name in zip(axes[:, 0], (moments, clean), ("RV", "RV − spots")):
+    for panel, (rv, sigma), name in zip(axes[:, 0], (moments, clean), ("RV", "spot-corrected RV")):
         panel.errorbar(days, numbers[rv], numbers[sigma], fmt="o", color="black", ecolor="grey", markersize=3)
         panel.set_ylabel(f"{name} (km/s)")
     axes[-1, 0].set_xlabel(label)

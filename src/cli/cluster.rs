@@ -5,6 +5,7 @@
 
 use super::signals::Signals;
 use super::{Failure, Global};
+use crate::data::io::lines::Claim;
 use crate::runs::pool::Pool;
 
 /// The other ranks, until a command takes them.
@@ -28,6 +29,18 @@ pub fn pool(global: &Global, signals: &Signals) -> Pool {
     }
     let _ = global;
     Pool::threads(signals.flag())
+}
+
+/// Claims the place of results before a long search; a signal meanwhile undoes it. Of several ranks one may end the job
+/// where it has no data, and nothing is written before: there it is claimed when what is returned is called.
+pub fn claim<E>(
+    pool: &Pool,
+    signals: &Signals,
+    claim: impl Fn() -> Result<Claim, E>,
+) -> Result<impl FnOnce() -> Result<Claim, E>, E> {
+    let early = if pool.is_of_ranks() { None } else { Some(claim()?) };
+    early.iter().for_each(|claim| signals.undo_by(claim.undo()));
+    Ok(move || early.map_or_else(claim, Ok))
 }
 
 /// Joins the other ranks, if there are any.

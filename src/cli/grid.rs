@@ -64,15 +64,12 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         scan.map_err(failed)?
     } else {
         let claim = || GridScan::claim(folder, args.output.replaces());
-        // of several ranks one may end the job where it has no data: nothing is written before
-        let early = if pool.is_of_ranks() { None } else { Some(claim().map_err(failed)?) };
-        early.iter().for_each(|claim| signals.undo_by(claim.undo()));
+        let claim = cluster::claim(&pool, &signals, claim).map_err(failed)?;
         let scene = fitted(global, scene.clone());
         let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
         signals.defer();
         let spinner = progress::bar(global, None, "start images for distant nodes");
-        let claim = early.map_or_else(claim, Ok);
-        let scan = claim.and_then(|claim| GridScan::begin(&scene, plan, found, folder, claim));
+        let scan = claim().and_then(|claim| GridScan::begin(&scene, plan, found, folder, claim));
         spinner.finish_and_clear();
         scan.map_err(failed)?
     };

@@ -87,15 +87,12 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             Start::Prior => StartFrom::Prior,
         };
         let claim = || Run::claim(folder, args.output.replaces());
-        // of several ranks one may end the job where it has no data: nothing is written before
-        let early = if pool.is_of_ranks() { None } else { Some(claim().map_err(failed)?) };
-        early.iter().for_each(|claim| signals.undo_by(claim.undo()));
+        let claim = cluster::claim(&pool, &signals, claim).map_err(failed)?;
         let scene = fitted(global, scene.clone());
         let found = search(global, &args.config, &scene, &scene.space)?;
         let spinner = progress::bar(global, None, "start of the walkers");
         signals.defer();
-        let run = Run::in_memory(&scene, found, from, &pool)
-            .and_then(|run| run.kept_by(early.map_or_else(claim, Ok)?, folder));
+        let run = Run::in_memory(&scene, found, from, &pool).and_then(|run| run.kept_by(claim()?, folder));
         spinner.finish_and_clear();
         run.map_err(failed)?
     };

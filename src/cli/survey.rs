@@ -1,6 +1,7 @@
 //! `dimcmc survey`: the rate of planets in a sample of stars.
 
 use super::output::Output;
+use super::signals::{RESULT, Signals};
 use super::{Failure, console};
 use crate::numerics::text::shown;
 use crate::planets::occurrence::RatePrior;
@@ -54,6 +55,7 @@ fn of_masses(text: &str) -> Result<PlanetBox, String> {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     args.output.spare(args.table.as_slice(), |name| [CSV, COMPLETENESS, JSON].contains(&name))?;
     let mut settings = SurveySettings {
@@ -70,6 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         settings.boxes = boxes;
     }
     let survey = Survey::of(&args.folders, &settings)?;
+    signals.defer();
     let folder = args.output.create()?;
     survey.write(folder)?;
     console::line(format_args!("{}written: {}: {CSV}, {COMPLETENESS}, {JSON}", survey.table(), shown(folder)));

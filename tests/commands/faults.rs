@@ -13,7 +13,7 @@ fn long() -> Value {
     config
 }
 
-fn send(signal: &str, child: &Child) {
+pub(crate) fn send(signal: &str, child: &Child) {
     assert!(Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status().unwrap().success());
 }
 
@@ -40,7 +40,7 @@ fn broken() -> [Stdio; 2] {
 
 /// Waits until the program waits for signals: Linux says which it catches.
 #[cfg(target_os = "linux")]
-fn catches_signals(child: &mut Child) {
+pub(crate) fn catches_signals(child: &mut Child) {
     let began = Instant::now();
     let catches = |status: String| {
         let line = status.lines().find_map(|line| line.strip_prefix("SigCgt:").map(str::to_owned));

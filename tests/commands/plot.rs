@@ -56,7 +56,7 @@ fn every_folder_has_its_figures() {
             "map/figures/rv.svg",
             &[
                 "RV (km/s)",
-                "RV − spots (m/s)",
+                "spot-corrected RV (m/s)",
                 "residual (m/s)",
                 "time (d)",
                 "rotation cycle",

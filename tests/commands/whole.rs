@@ -2,6 +2,8 @@
 //! obstacle, and of two commands for one folder one is refused before it has worked.
 
 use crate::desk::{Desk, dimcmc, says, text, tiny};
+#[cfg(target_os = "linux")]
+use crate::faults::{catches_signals, send};
 use serde_json::{Value, json};
 use std::process::Child;
 use std::time::{Duration, Instant};
@@ -27,20 +29,8 @@ fn plan() -> Value {
 
 #[cfg(target_os = "linux")]
 fn send_once_caught(signal: &str, child: &mut Child) {
-    let began = Instant::now();
-    let catches = |status: String| {
-        let line = status.lines().find_map(|line| line.strip_prefix("SigCgt:").map(str::to_owned));
-        // SIGTERM is number 15
-        line.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).unwrap() >> 14 & 1 == 1)
-    };
-    let status = format!("/proc/{}/status", child.id());
-    while !std::fs::read_to_string(&status).is_ok_and(catches) {
-        let waits = child.try_wait().unwrap().is_none() && began.elapsed() < Duration::from_secs(60);
-        assert!(waits, "ends or never listens");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let sent = std::process::Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status();
-    assert!(sent.unwrap().success());
+    catches_signals(child);
+    send(signal, child);
 }
 
 #[test]

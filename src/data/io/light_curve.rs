@@ -3,10 +3,9 @@
 mod columns;
 mod zero_point;
 
-use super::FileError;
 use super::atomic::{WriteError, write};
-use super::csv;
 use super::table::{self, NotText, Row, Table};
+use super::{FileError, csv, outweighs};
 use crate::surface::photometry::Flux;
 use columns::{Brightness, Columns};
 use std::collections::{BTreeSet, HashSet};
@@ -25,9 +24,6 @@ const MAGNITUDES: [f64; 2] = [-30.0, 40.0];
 
 /// Where more than this share of the fluxes is 0 or below, they are no fluxes.
 const FEW: f64 = 0.1;
-
-/// An error smaller than the usual one by more than this is a mistake, and decides everything.
-const OUT_OF_PROPORTION: f64 = 1e3;
 
 /// Fluxes without a unit whose median is in this range, and most of which lie within so much, are magnitudes: fluxes
 /// are near 1, or counts by the hundred.
@@ -146,14 +142,13 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
     };
     let sigmas = sorted(2);
     let usual = sigmas[sigmas.len() / 2];
-    let too_sure = |row: &&Row| numbers(row, &columns).is_ok_and(|[_, _, sigma]| OUT_OF_PROPORTION * sigma < usual);
-    if let Some(row) = table.rows.iter().find(too_sure) {
+    let too_sure = |row: &'_ Row| {
+        let problem = outweighs(numbers(row, &columns).ok()?[2], usual, "rows")?;
         let (name, cell) = (columns.name(columns.sigma), table::shown(row.cell(columns.sigma)));
-        let problem = format!(
-            "{name}: {cell} is less than a thousandth of the usual {usual:.1e}: it would outweigh all other rows. \
-             Correct it, or leave the row out"
-        );
-        return Err((row.line, problem));
+        Some((row.line, format!("{name}: {cell} is {problem}. Correct it, or leave the row out")))
+    };
+    if let Some(problem) = table.rows.iter().find_map(too_sure) {
+        return Err(problem);
     }
     let values = sorted(1);
     let median = values[values.len() / 2];

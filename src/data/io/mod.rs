@@ -20,6 +20,15 @@ pub mod zdipy;
 
 use std::path::{Path, PathBuf};
 
+/// An uncertainty smaller than the usual one by more than this is a mistake, and would decide everything.
+const OUT_OF_PROPORTION: f64 = 1e3;
+
+/// That an uncertainty is so small beside the `usual` one that it would outweigh all other `rows`, where it is.
+fn outweighs(sigma: f64, usual: f64, rows: &str) -> Option<String> {
+    let problem = || format!("less than a thousandth of the usual {usual:.1e}: it would outweigh all other {rows}");
+    (OUT_OF_PROPORTION * sigma < usual).then(problem)
+}
+
 /// What is wrong with a table, a list or another program's file: one line that names the file, and the line in it.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {

@@ -158,7 +158,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         panel.bare_y_frame(&mut figure);
         figure.text("cycle + phase", [frame.right() + LABELS - 1.0, top - 3.0], TINY, Align::Right, 0.0);
         if column == 0 {
-            let label = "intensity / continuum, shifted by phase";
+            let label = "intensity / continuum + offset";
             figure.text(label, [frame.left - 4.5, frame.centre()[1]], Font::LABEL, Align::Centre, 90.0);
             depth_bar(&mut figure, &panel, spacing);
         }

@@ -194,7 +194,7 @@ impl Curves<'_> {
             let whole = Rect { left, top: at, width, height: room * share / total };
             let (series, label, unit) = match k {
                 0 => (moments.clone(), "RV", Speeds::KMS),
-                1 => (vec![&self.clean], "RV − spots", unit),
+                1 => (vec![&self.clean], "spot-corrected RV", unit),
                 _ => (vec![&self.residual], "residual", unit),
             };
             let y = unit.axis(label, range(&series, if k > 1 { 0.0 } else { self.vsys_kms }));
@@ -289,7 +289,8 @@ impl Curves<'_> {
         let others: Vec<f64> = self.cycle.iter().map(others).collect();
         let x = Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]);
         let alone = self.clean.less(&others);
-        let panel = Panel { frame: above, x: x.clone(), y: unit.axis("RV − spots", range(&[&alone], self.vsys_kms)) };
+        let panel =
+            Panel { frame: above, x: x.clone(), y: unit.axis("spot-corrected RV", range(&[&alone], self.vsys_kms)) };
         // counted from the largest velocity
         let orbit = Eccentric { orbit: Orbit { porb_over_prot: 1.0, phi: 0.0, ..first.orbit }, ..first };
         let rv = |phase: f64| unit.factor * (self.vsys_kms + orbit.velocity_kms(phase));

@@ -148,7 +148,7 @@ pub fn is_fused() -> bool {
     #[cfg(target_arch = "x86_64")]
     return has_avx2();
     #[cfg(not(target_arch = "x86_64"))]
-    false
+    cfg!(target_arch = "aarch64")
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -5,7 +5,7 @@ use super::SurveySettings;
 use super::boxes::{PlanetBox, Size};
 use super::rates::{RateRecord, rates};
 use super::star::Star;
-use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::{Table, quoted};
 use crate::data::io::saved::Saved;
 use crate::numerics::text::{Align, columns, escaped};
@@ -188,9 +188,12 @@ impl SurveyFile {
 
     /// Writes the files into `folder`, which must exist.
     pub(super) fn write(&self, stars: &[Star], folder: &Path) -> Result<(), WriteError> {
-        write(&folder.join(CSV), &self.of_stars().into_bytes())?;
-        write(&folder.join(COMPLETENESS), &completeness(stars).into_bytes())?;
-        write_json(&folder.join(JSON), self)
+        let (of_stars, completeness) = (self.of_stars().into_bytes(), completeness(stars).into_bytes());
+        write_set(folder, &|stage| {
+            write(&stage.join(CSV), &of_stars)?;
+            write(&stage.join(COMPLETENESS), &completeness)?;
+            write_json(&stage.join(JSON), self)
+        })
     }
 
     /// `survey.csv`.

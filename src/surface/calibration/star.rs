@@ -193,7 +193,7 @@ impl MeasuredStar {
         if numbers.is_empty() {
             let why = if *gain < NEEDED { "" } else { ", less than values so far from their priors cost" };
             return format!(
-                "star as in the config, active regions with the photosphere's line (fitting both gains Δln Z = \
+                "none: star as in the config, active regions with the photosphere's line (fitting them gains Δln Z = \
                 {gain:.1}{why})"
             );
         }

@@ -5,6 +5,7 @@ use super::axis::Axis;
 use super::layout::{Announced, Layout, wrong_count};
 use super::level::{self, Given};
 use super::row::{Digits, Fault, Row, fault, shown};
+use crate::data::io::outweighs;
 use crate::data::io::table::{Line, Lines, Separator, has_decimal_comma, number};
 use std::ops::Range;
 
@@ -33,9 +34,6 @@ const LARGEST: f64 = 1e6;
 
 /// Errors larger than the usual one by this mark the ends of a profile as no data.
 const WEIGHTLESS: f64 = 100.0;
-
-/// An error smaller than the usual one by more than this is a mistake, and decides everything.
-const OUT_OF_PROPORTION: f64 = 1e3;
 
 /// Fewest bins that make a profile.
 pub(super) const MIN_BINS: usize = 5;
@@ -107,13 +105,10 @@ pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
     let mut sigmas: Vec<f64> = good.iter().map(|j| rows[*j].sigma).collect();
     sigmas.sort_by(f64::total_cmp);
     let usual = sigmas[sigmas.len() / 2];
-    let too_sure = |(_, row): &(usize, &Row)| row.bad.is_none() && OUT_OF_PROPORTION * row.sigma < usual;
-    profile.bad.extend(rows.iter().enumerate().filter(too_sure).map(|(j, row)| {
-        let problem = format!(
-            "sigma {:e} is less than a thousandth of the usual {usual:.1e}: it would outweigh all other bins",
-            row.sigma
-        );
-        (j, Fault { line: row.line, problem })
+    let sound = rows.iter().enumerate().filter(|(_, row)| row.bad.is_none());
+    profile.bad.extend(sound.filter_map(|(j, row)| {
+        let problem = format!("sigma {:e} is {}", row.sigma, outweighs(row.sigma, usual, "bins")?);
+        Some((j, Fault { line: row.line, problem }))
     }));
     let most = WEIGHTLESS * usual;
     let weightless = |row: &&Row| row.bad.is_some() || row.sigma > most;
