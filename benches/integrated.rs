@@ -10,6 +10,7 @@ use dimcmc::internals::surface::Known;
 use dimcmc::internals::surface::evolving_map::{Basis, Held, MarginalPosterior, fit};
 use dimcmc::{Config, LogDensity as _, Scene};
 use serde_json::json;
+use std::sync::Arc;
 
 /// Milliseconds of 40 profiles of 57 bins on one core.
 const NEW_STAR: Target = Target::AtMost(200.0);
@@ -92,7 +93,7 @@ fn measure(profiles: usize, table: &mut Table) {
     let judged = |target: Target, ms: f64| if profiles == 40 { target.judge(ms, 2) } else { format!("{ms:.2}") };
     let star = posterior(&[&ORBIT[..], &[Parameter::Inclination, Parameter::Vsini]].concat());
     let reference = 1e3 * fastest(&(0..2).map(|_| seconds(|| posterior(&ORBIT))).collect::<Vec<_>>());
-    let basis = Basis::new(&scene.imager.grid);
+    let basis = Arc::new(Basis::seen(&scene.imager, &values));
     let known = Known { jitter_kms: Some(0.0), ..Known::default() };
     let fitted = seconds(|| fit(&scene.imager, &basis, values, known, None).expect("a field"));
     table.row([

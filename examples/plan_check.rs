@@ -18,6 +18,7 @@ use dimcmc::internals::surface::Known;
 use dimcmc::internals::surface::evolving_map::{Assumed, Basis, fit};
 use dimcmc::internals::surface::expansion::nuisances;
 use serde_json::json;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A campaign of 16 nights, with the seed of nights, spots and noise.
@@ -57,10 +58,10 @@ fn forecast(campaign: &Campaign, assumed: Assumed, range: [f64; 2], per_cycle: &
 fn achieved(config: &Config, per_cycle: &[f64], before: Option<Known>) -> (Vec<f64>, Assumed) {
     let scene = Scene::new(config).expect("a scene");
     let known = scene.surface().field.expect("what is known of the field");
-    let basis = Basis::new(&scene.imager.grid);
+    let basis = Arc::new(Basis::new(&scene.imager.grid));
     let known = before.unwrap_or(known);
     let fitted = fit(&scene.imager, &basis, scene.settings.values, known, None).expect("a field");
-    let expansion = fitted.marginal.expansion(&scene.imager, &basis, &[]).expect("an expansion");
+    let expansion = fitted.marginal.expansion(&scene.imager, &[]).expect("an expansion");
     let quadratic = expansion.velocities(&nuisances(&scene.settings.free));
     let sigma = |trial: &dimcmc::internals::planets::periodogram::Trial| {
         trial.information.try_inverse().map_or(f64::NAN, |covariance| (0.5 * covariance.trace()).sqrt())

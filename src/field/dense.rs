@@ -40,14 +40,14 @@ pub fn gram_of_columns(a: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// The transpose of some rows (first, number), as they stand in memory. For the right side of a product alone: on the
 /// left of few columns nalgebra 0.34 reads beyond its end.
-fn rows_turned(matrix: &DMatrix<f64>, (first, rows): (usize, usize)) -> Turned<'_> {
+pub(super) fn rows_turned(matrix: &DMatrix<f64>, (first, rows): (usize, usize)) -> Turned<'_> {
     let (n, columns) = matrix.shape();
     let from = if columns > 0 { &matrix.as_slice()[first..] } else { &[] };
     MatrixView::from_slice_with_strides_generic(from, Dyn(columns), Dyn(rows), Dyn(n), Dyn(1))
 }
 
 /// Columns whose numbers do not stand side by side.
-type Turned<'a> = MatrixView<'a, f64, Dyn, Dyn, Dyn, Dyn>;
+pub(super) type Turned<'a> = MatrixView<'a, f64, Dyn, Dyn, Dyn, Dyn>;
 
 /// First column and number of columns of every block.
 fn blocks(n: usize, block: usize) -> impl DoubleEndedIterator<Item = (usize, usize)> + ExactSizeIterator {

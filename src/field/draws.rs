@@ -1,6 +1,6 @@
 //! Fields drawn at random: before the data, and after them.
 
-use super::{Compression, Epoch, Evidence, Field, FieldError};
+use super::{Compression, Degrees, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::StandardNormal;
@@ -10,7 +10,7 @@ const ROUNDING: f64 = 1e-13;
 
 impl Field {
     /// Coefficients (H, times) of a field of harmonics of these `degrees` (H) at some times (d), before any data.
-    pub fn drawn(&self, degrees: &[usize], times_d: &[f64], rng: &mut impl Rng) -> DMatrix<f64> {
+    pub fn drawn(&self, degrees: &Degrees, times_d: &[f64], rng: &mut impl Rng) -> DMatrix<f64> {
         let correlation =
             DMatrix::from_fn(times_d.len(), times_d.len(), |j, k| self.kernel.at(times_d[j] - times_d[k]));
         // the symmetric root does not hang on the signs of eigenvectors
@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn draws_before_the_data_have_the_covariance_of_the_field() {
-        let (field, degrees, times) = (field(), [1, 1, 2], [0.0, 1.5, 9.0]);
+        let (field, degrees, times) = (field(), Degrees::from(vec![1, 1, 2]), [0.0, 1.5, 9.0]);
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let n = 20_000;
         let mut sum = DMatrix::zeros(3, 3);
@@ -89,7 +89,7 @@ mod tests {
     /// Mean and standard deviation are those that the evidence has in closed form.
     #[test]
     fn draws_after_the_data_have_their_mean_and_scatter() {
-        let (field, degrees) = (field(), [1, 1, 2]);
+        let (field, degrees) = (field(), Degrees::from(vec![1, 1, 2]));
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let mut normal = |r: usize, c: usize| DMatrix::from_fn(r, c, |_, _| rng.sample::<f64, _>(StandardNormal));
         let epoch = |(k, numbers): (usize, DMatrix<f64>)| Epoch {

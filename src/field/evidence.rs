@@ -14,7 +14,7 @@ use super::covariance::Covariance;
 use super::dense::{self, Factor, inverses, scale_rows};
 use super::numbers::Numbers;
 use super::tilt::Tilt;
-use super::{Epoch, Field, FieldError, Quadratic};
+use super::{Degrees, Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -24,7 +24,7 @@ use std::sync::OnceLock;
 #[derive(Clone, Debug)]
 pub struct Evidence {
     pub(super) field: Field,
-    pub(super) degrees: Vec<usize>,
+    pub(super) degrees: Degrees,
     /// Prior standard deviation of each coefficient (H).
     pub(super) sd: Vec<f64>,
     /// The data, compressed.
@@ -58,7 +58,7 @@ impl Evidence {
     /// together panic.
     pub fn new(
         field: Field,
-        degrees: &[usize],
+        degrees: &Degrees,
         epochs: &[Epoch],
         around: &DMatrix<f64>,
         how: Compression,
@@ -69,7 +69,7 @@ impl Evidence {
     /// The same with what is known from the evidence of a field and a star nearby.
     pub(super) fn of(
         field: Field,
-        degrees: &[usize],
+        degrees: &Degrees,
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         how: Compression,
         Nearby { explained, mut seen }: Nearby,
@@ -119,7 +119,7 @@ impl Evidence {
         let mut dual = whitened.columns(0, 1).into_owned();
         covariance.backward(&mut dual);
         let dual = dual.column(0).into_owned();
-        let (degrees, epochs) = (degrees.to_vec(), compressed);
+        let (degrees, epochs) = (degrees.clone(), compressed);
         Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic, explained: own })
     }
 
@@ -316,7 +316,9 @@ mod tests {
         }
     }
 
-    const DEGREES: [usize; 8] = [1, 1, 1, 2, 2, 2, 2, 2];
+    fn degrees() -> Degrees {
+        vec![1, 1, 1, 2, 2, 2, 2, 2].into()
+    }
 
     fn field() -> Field {
         let spectrum = Spectrum { amplitude: 0.8, slope: 0.5, break_degree: 0.0 };
@@ -332,7 +334,7 @@ mod tests {
             epochs[2].divisor = DVector::repeat(8, 0.3);
             let around = DMatrix::zeros(8, 3);
             let nearby = Nearby { explained, seen: None };
-            Evidence::of(field(), &DEGREES, (&epochs, &around), Compression::default(), nearby).unwrap()
+            Evidence::of(field(), &degrees(), (&epochs, &around), Compression::default(), nearby).unwrap()
         };
         let (own, told) = (of(None), of(Some(vec![0.5; 3])));
         assert_ne!(own.ln_evidence(), told.ln_evidence());
@@ -349,7 +351,7 @@ mod tests {
             let epochs: Vec<Epoch> = these.iter().map(|k| epochs[*k].clone()).collect();
             let around = some(8, 5).select_columns(these) * 0.1;
             // several numbers are compressed away
-            Evidence::new(field(), &DEGREES, &epochs, &around, Compression { left_out: 1e-9 }).unwrap()
+            Evidence::new(field(), &degrees(), &epochs, &around, Compression { left_out: 1e-9 }).unwrap()
         };
         let misfits: Vec<DVector<f64>> = epochs.iter().map(|epoch| epoch.misfit.clone()).collect();
         let slopes: Vec<DMatrix<f64>> = epochs.iter().map(|epoch| epoch.slopes.clone()).collect();

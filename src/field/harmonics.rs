@@ -6,6 +6,7 @@
 //! out: profiles do not tell the mean level (`docs/method.md` section 9). The Legendre part is that of a whole ring of
 //! points of one latitude.
 
+use super::Degrees;
 use nalgebra::DMatrix;
 
 /// The harmonics up to a degree, with the constants of their recurrences.
@@ -47,9 +48,9 @@ impl Harmonics {
         self.largest == 0
     }
 
-    /// Degree of each of the H harmonics.
-    pub fn degrees(&self) -> Vec<usize> {
-        (1..=self.largest).flat_map(|l| std::iter::repeat_n(l, 2 * l + 1)).collect()
+    /// Degrees of the H harmonics.
+    pub fn degrees(&self) -> Degrees {
+        (1..=self.largest).flat_map(|l| std::iter::repeat_n(l, 2 * l + 1)).collect::<Vec<_>>().into()
     }
 
     /// Legendre functions `P_lm(sin b)` of all points of latitude b (rad), for l from 1 to L and in each m from 0 to l.

@@ -3,6 +3,7 @@
 //! The large part of it, a row a datum, is that of what is divided by a continuum, and the same wherever the model is
 //! made linear: it is shared, not copied.
 
+use super::dense::{rows_turned, scale_rows};
 use nalgebra::{DMatrix, DVector, DVectorView};
 use std::sync::Arc;
 
@@ -10,8 +11,8 @@ use std::sync::Arc;
 /// derivative of ln s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jacobian {
-    /// A (data, H).
-    rows: Arc<DMatrix<f64>>,
+    /// A^T (H, data): products with columns of coefficients go along what stands side by side.
+    turned: Arc<DMatrix<f64>>,
     scale: f64,
     /// u (data) and d (H); zeros where there is no such part.
     outer: (DVector<f64>, DVector<f64>),
@@ -20,39 +21,39 @@ pub struct Jacobian {
 impl From<DMatrix<f64>> for Jacobian {
     fn from(rows: DMatrix<f64>) -> Self {
         let outer = (DVector::zeros(rows.nrows()), DVector::zeros(rows.ncols()));
-        Jacobian::new(Arc::new(rows), 1.0, outer)
+        Jacobian::new(Arc::new(rows.transpose()), 1.0, outer)
     }
 }
 
 impl Jacobian {
-    /// `scale A + u d^T`. Panics where shapes do not go together.
-    pub fn new(rows: Arc<DMatrix<f64>>, scale: f64, (u, d): (DVector<f64>, DVector<f64>)) -> Self {
-        assert_eq!(rows.shape(), (u.len(), d.len()), "both parts of J");
-        Jacobian { rows, scale, outer: (u, d) }
+    /// `scale A + u d^T`, given A^T (H, data). Panics where shapes do not go together.
+    pub fn new(turned: Arc<DMatrix<f64>>, scale: f64, (u, d): (DVector<f64>, DVector<f64>)) -> Self {
+        assert_eq!(turned.shape(), (d.len(), u.len()), "both parts of J");
+        Jacobian { turned, scale, outer: (u, d) }
     }
 
     /// Numbers of data and of coefficients.
     pub fn shape(&self) -> (usize, usize) {
-        self.rows.shape()
+        (self.turned.ncols(), self.turned.nrows())
     }
 
     /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         let (u, d) = &self.outer;
-        self.scale.is_finite() && finite(self.rows.as_slice()) && finite(u.as_slice()) && finite(d.as_slice())
+        self.scale.is_finite() && finite(self.turned.as_slice()) && finite(u.as_slice()) && finite(d.as_slice())
     }
 
     /// J (data, H).
     pub fn whole(&self) -> DMatrix<f64> {
-        self.after(&DMatrix::identity(self.rows.nrows(), self.rows.nrows()))
+        self.after(&DMatrix::identity(self.turned.ncols(), self.turned.ncols()))
     }
 
     /// `J c`.
     pub fn times(&self, c: DVectorView<f64>) -> DVector<f64> {
         let (u, d) = &self.outer;
         let mut product = u * d.dot(&c);
-        product.gemv(self.scale, &self.rows, &c, 1.0);
+        product.gemv_tr(self.scale, &self.turned, &c, 1.0);
         product
     }
 
@@ -60,15 +61,16 @@ impl Jacobian {
     pub fn tr_times(&self, x: &DVector<f64>) -> DVector<f64> {
         let (u, d) = &self.outer;
         let mut product = d * u.dot(x);
-        product.gemv_tr(self.scale, &self.rows, x, 1.0);
+        product.gemv(self.scale, &self.turned, x, 1.0);
         product
     }
 
     /// `P J` (rows, H) for P (rows, data).
     pub fn after(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
         let (u, d) = &self.outer;
-        let mut product = p * &*self.rows;
-        product *= self.scale;
+        let coefficients = self.turned.nrows();
+        let mut product = DMatrix::zeros(p.nrows(), coefficients);
+        product.gemm(self.scale, p, &rows_turned(&self.turned, (0, coefficients)), 0.0);
         product.ger(1.0, &(p * u), d, 1.0);
         product
     }
@@ -76,13 +78,11 @@ impl Jacobian {
     /// `J S J^T` (data, data), S diagonal.
     pub fn covariance(&self, variances: &[f64]) -> DMatrix<f64> {
         let (u, d) = &self.outer;
-        let mut turned = self.rows.transpose();
-        for mut column in turned.column_iter_mut() {
-            column.iter_mut().zip(variances).for_each(|(x, variance)| *x *= variance);
-        }
-        let along = turned.tr_mul(d) * self.scale;
+        let mut scaled = (*self.turned).clone();
+        scale_rows(&mut scaled, variances);
+        let along = scaled.tr_mul(d) * self.scale;
         let own: f64 = d.iter().zip(variances).map(|(d, variance)| d * d * variance).sum();
-        let mut covariance = &*self.rows * turned;
+        let mut covariance = scaled.transpose() * &*self.turned;
         covariance *= self.scale * self.scale;
         covariance.ger(1.0, &along, u, 1.0);
         covariance.ger(1.0, u, &along, 1.0);
@@ -100,7 +100,7 @@ mod tests {
         let some = |n: usize, m: usize| DMatrix::from_fn(n, m, |i, j| ((7 * i + 5 * j + 3 * i * j) % 11) as f64 - 4.5);
         let (u, d, variances) = (some(4, 1).column(0).into_owned(), some(9, 1).column(0).into_owned(), [0.3; 9]);
         let whole = some(4, 9) * 0.7 + &u * d.transpose();
-        let jacobian = Jacobian::new(Arc::new(some(4, 9)), 0.7, (u, d));
+        let jacobian = Jacobian::new(Arc::new(some(4, 9).transpose()), 0.7, (u, d));
         let close = |got: &DMatrix<f64>, known: &DMatrix<f64>| (got - known).amax() < 1e-12 * known.amax();
         let column = |x: DVector<f64>| DMatrix::from_column_slice(x.len(), 1, x.as_slice());
         assert!(close(&jacobian.whole(), &whole));

@@ -52,7 +52,7 @@ pub use kernel::{Kernel, Lifetime};
 pub use quadratic::Quadratic;
 pub(crate) use settle::approach;
 pub use settle::{Settled, Settling, Sought, settle};
-pub use spectrum::Spectrum;
+pub use spectrum::{Degrees, Spectrum};
 
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,7 @@
 use super::epoch::pulled;
 use super::evidence::Nearby;
 use super::tilt::tilted;
-use super::{Compression, Epoch, Evidence, Field, FieldError};
+use super::{Compression, Degrees, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -26,8 +26,8 @@ const MIXED: usize = 3;
 pub struct Sought<'a> {
     /// The field before the data.
     pub field: Field,
-    /// Degree of each coefficient (H).
-    pub degrees: &'a [usize],
+    /// Degrees of the coefficients (H).
+    pub degrees: &'a Degrees,
     /// Harmonics (points, H) of the points at which changes of the field are watched: some hundred.
     pub watched: &'a DMatrix<f64>,
 }
@@ -152,8 +152,14 @@ pub(crate) fn approach(
             break;
         }
         let ends = changes[2] < settings.tolerance;
-        let way = if ends || changes[2] > settings.longest { step } else { mixing.mixed(&coefficients, step) };
-        let length = (sought.watched * &way).amax();
+        let (way, length) = match ends || changes[2] > settings.longest {
+            true => (step, changes[2]),
+            false => {
+                let way = mixing.mixed(&coefficients, step);
+                let length = (sought.watched * &way).amax();
+                (way, length)
+            }
+        };
         coefficients += way * if length > settings.longest { settings.longest / length } else { 1.0 };
         epochs = linearise(&coefficients);
         if ends {

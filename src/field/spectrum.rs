@@ -19,25 +19,56 @@ pub struct Spectrum {
     pub break_degree: f64,
 }
 
+/// Degrees (1 or more) of the coefficients of a field.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Degrees {
+    /// Of each.
+    pub of_each: Vec<usize>,
+    /// Of each that is not among them, for no data see it, but has its share in the variance of the field.
+    pub unseen: Vec<usize>,
+}
+
+impl From<Vec<usize>> for Degrees {
+    fn from(of_each: Vec<usize>) -> Self {
+        Degrees { of_each, unseen: Vec::new() }
+    }
+}
+
+impl Degrees {
+    /// Number of coefficients.
+    pub fn len(&self) -> usize {
+        self.of_each.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.of_each.is_empty()
+    }
+}
+
 impl Spectrum {
-    /// Variance of each coefficient, given the degrees (1 or more) of all.
-    pub fn variances(&self, degrees: &[usize]) -> Vec<f64> {
-        let shares = self.shares(degrees);
-        shares.into_iter().map(|share| self.amplitude * self.amplitude * share).collect()
+    /// Variance of each coefficient.
+    pub fn variances(&self, degrees: &Degrees) -> Vec<f64> {
+        let [seen, _] = self.shares(degrees);
+        seen.into_iter().map(|share| self.amplitude * self.amplitude * share).collect()
     }
 
     /// Derivative of the logarithm of each variance with respect to the slope; with respect to ln amplitude it is 2.
-    pub fn log_variances_by_slope(&self, degrees: &[usize]) -> Vec<f64> {
-        let shares = self.shares(degrees);
-        let mean: f64 = shares.iter().zip(degrees).map(|(share, l)| share * self.log_size(*l)).sum();
-        degrees.iter().map(|l| mean - self.log_size(*l)).collect()
+    pub fn log_variances_by_slope(&self, degrees: &Degrees) -> Vec<f64> {
+        let [seen, unseen] = self.shares(degrees);
+        let along = |shares: &[f64], of: &[usize]| -> f64 {
+            shares.iter().zip(of).map(|(share, l)| share * self.log_size(*l)).sum()
+        };
+        let mean = along(&seen, &degrees.of_each) + along(&unseen, &degrees.unseen);
+        degrees.of_each.iter().map(|l| mean - self.log_size(*l)).collect()
     }
 
-    /// Shares of the coefficients in the field's variance; they sum to 1.
-    fn shares(&self, degrees: &[usize]) -> Vec<f64> {
-        let weights: Vec<f64> = degrees.iter().map(|l| (-self.slope * self.log_size(*l)).exp()).collect();
-        let sum: f64 = weights.iter().sum();
-        weights.into_iter().map(|weight| weight / sum).collect()
+    /// Shares in the field's variance of the coefficients and of those that no data see; they sum to 1.
+    fn shares(&self, degrees: &Degrees) -> [Vec<f64>; 2] {
+        let weight = |l: &usize| (-self.slope * self.log_size(*l)).exp();
+        let weights = [&degrees.of_each, &degrees.unseen].map(|of| of.iter().map(weight).collect::<Vec<f64>>());
+        let sum: f64 = weights.iter().flatten().sum();
+        weights.map(|of| of.into_iter().map(|weight| weight / sum).collect())
     }
 
     /// `ln [b(b+1) + l(l+1)]`.
@@ -53,7 +84,7 @@ mod tests {
 
     #[test]
     fn variances_sum_to_that_of_the_field_and_follow_the_slope() {
-        let degrees = [1, 1, 1, 2, 2, 2, 2, 2, 7];
+        let degrees = Degrees::from(vec![1, 1, 1, 2, 2, 2, 2, 2, 7]);
         // sizes of degrees 2 and 1: 6 and 2 without a break, 26 and 22 with one at 4
         for (break_degree, ratio) in [(0.0, 3.0_f64), (4.0, 26.0 / 22.0)] {
             let at = |slope| Spectrum { amplitude: 0.3, slope, break_degree };
@@ -64,6 +95,20 @@ mod tests {
             for (h, derivative) in at(0.75).log_variances_by_slope(&degrees).into_iter().enumerate() {
                 // rounding of 1e-16 over a step of 2e-5
                 assert!((derivative - (above[h] / below[h]).ln() / 2e-5).abs() < 1e-9);
+            }
+        }
+    }
+
+    /// Coefficients that no data see leave the variances of the others, and their slopes, as they are.
+    #[test]
+    fn what_is_unseen_has_its_share() {
+        let spectrum = Spectrum { amplitude: 0.3, slope: 0.75, break_degree: 4.0 };
+        let all = Degrees::from(vec![1, 2, 2, 7, 7]);
+        let some = Degrees { of_each: vec![1, 2, 7], unseen: vec![2, 7] };
+        let of = |degrees: &Degrees| [spectrum.variances(degrees), spectrum.log_variances_by_slope(degrees)];
+        for (all, some) in of(&all).iter().zip(of(&some)) {
+            for (all, some) in [all[0], all[1], all[3]].iter().zip(some) {
+                assert!((all / some - 1.0).abs() < 1e-14, "{all} {some}");
             }
         }
     }

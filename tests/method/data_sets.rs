@@ -74,8 +74,7 @@ fn each_set_is_seen_as_if_it_were_alone() {
     );
     // so are the data of a field, linearised anywhere
     let basis = Basis::new(&both.imager.grid);
-    let coefficients =
-        |profiles: usize| DMatrix::from_fn(basis.degrees.len(), profiles, |h, _| 0.02 * (h as f64).sin());
+    let coefficients = |profiles: usize| DMatrix::from_fn(basis.len(), profiles, |h, _| 0.02 * (h as f64).sin());
     let depths = |scene: &Scene| {
         let design = Design::new(&scene.imager, &basis, &state);
         let maps = coefficients(scene.imager.profiles().count());

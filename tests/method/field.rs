@@ -6,7 +6,8 @@
 //! two by two.
 
 use dimcmc::internals::field::{
-    Compression, Epoch, Evidence, Field, Harmonics, Kernel, Lifetime, Settled, Settling, Sought, Spectrum, settle,
+    Compression, Degrees, Epoch, Evidence, Field, Harmonics, Kernel, Lifetime, Settled, Settling, Sought, Spectrum,
+    settle,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -39,7 +40,7 @@ struct Star {
     contrast: f64,
     profiles: Vec<Observed>,
     views: Vec<View>,
-    degrees: Vec<usize>,
+    degrees: Degrees,
     /// Harmonics (points, H) at which changes are watched.
     watched: DMatrix<f64>,
 }

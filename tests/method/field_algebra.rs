@@ -2,7 +2,7 @@
 //! limits.
 
 use dimcmc::internals::field::{
-    Compression, Epoch, Evidence, Field, FieldError, Kernel, Lifetime, Quadratic, Spectrum,
+    Compression, Degrees, Epoch, Evidence, Field, FieldError, Kernel, Lifetime, Quadratic, Spectrum,
 };
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -20,7 +20,7 @@ pub fn some(seed: usize, n: usize, m: usize) -> DMatrix<f64> {
 /// Data that are linear in a field: epochs around some coefficients, with nuisances and slopes.
 pub struct Problem {
     pub field: Field,
-    pub degrees: Vec<usize>,
+    pub degrees: Degrees,
     pub epochs: Vec<Epoch>,
     pub around: DMatrix<f64>,
 }
@@ -48,7 +48,7 @@ impl Problem {
             }
         };
         let epochs = times_d.iter().enumerate().map(epoch).collect();
-        Problem { field, degrees: degrees.to_vec(), epochs, around }
+        Problem { field, degrees: degrees.to_vec().into(), epochs, around }
     }
 
     pub fn of_degree_3(field: Field) -> Self {

@@ -2,7 +2,7 @@
 //! ln Z is there.
 
 use super::field_algebra::{EXACT, Problem, field, some};
-use dimcmc::internals::field::{Epoch, FieldError, Lifetime, Settling, Sought, settle};
+use dimcmc::internals::field::{Degrees, Epoch, FieldError, Lifetime, Settling, Sought, settle};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -65,7 +65,7 @@ fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
     let data: Vec<DVector<f64>> =
         (0..2).map(|k| model(k, &truth).0 + some(5 + k, 6, 1).column(0) * (3.0 * sigma)).collect();
     let field = field(0.4, 0.5, Lifetime::Static, 0.0);
-    let degrees = [1, 2];
+    let degrees = Degrees::from(vec![1, 2]);
     let linearise = |maps: &DMatrix<f64>| {
         let epoch = |k: usize| {
             let c = maps.column(k).into_owned();
@@ -107,7 +107,7 @@ fn ln_z_counts_how_the_volume_of_maps_grows_with_the_continuum() {
     let (lines, n, sigma) = (some(1, 30, 30), 30, 0.003);
     let continuum = |c: &DVector<f64>| 1.0 + 0.4 * c[0];
     let depth = |c: &DVector<f64>| (&lines * c.rows(1, n)).add_scalar(0.3) / continuum(c);
-    let degrees: Vec<usize> = std::iter::once(1).chain(std::iter::repeat_n(2, n)).collect();
+    let degrees = Degrees::from(std::iter::once(1).chain(std::iter::repeat_n(2, n)).collect::<Vec<_>>());
     let field = field(0.6, 0.5, Lifetime::Static, 0.0);
     let sd: Vec<f64> = field.spectrum.variances(&degrees).into_iter().map(f64::sqrt).collect();
     let truth = DVector::from_fn(n + 1, |h, _| sd[h] * 2.0 * some(2, n + 1, 1)[h]);

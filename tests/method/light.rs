@@ -39,7 +39,7 @@ fn assumed(lifetime_d: f64) -> Assumed {
     Assumed { field: Field { spectrum, kernel }, jitter_kms: 0.0 }
 }
 
-fn marginal(scene: &Scene, basis: &Basis, lifetime_d: f64) -> Marginal {
+fn marginal(scene: &Scene, basis: &Arc<Basis>, lifetime_d: f64) -> Marginal {
     let values = scene.settings.values;
     let design = Arc::new(Design::new(&scene.imager, basis, &values.state()));
     Marginal::new(&scene.imager, basis, design, values, assumed(lifetime_d), None).unwrap()
@@ -60,7 +60,7 @@ fn ln_z_of_profiles_and_a_light_curve_is_that_of_dense_algebra() {
         bin.place = (2.0 * k as f64 - first - last) / (last - first);
     }
     scene.imager.light_curves[0].segments = 2;
-    let (imager, basis) = (&scene.imager, Basis::exact(&scene.imager.grid));
+    let (imager, basis) = (&scene.imager, Arc::new(Basis::new(&scene.imager.grid).exactly()));
     let curve = &imager.light_curves[0];
     let marginal = marginal(&scene, &basis, 6.0);
     let coefficients = &marginal.settled.coefficients;
@@ -69,7 +69,7 @@ fn ln_z_of_profiles_and_a_light_curve_is_that_of_dense_algebra() {
     let epochs: Vec<Epoch> = marginal.design.epochs(imager, coefficients).into_iter().map(linear).collect();
     let bins = &imager.light_curves[0].bins;
     let data: usize = epochs.iter().map(|epoch| epoch.len()).sum();
-    let harmonics = basis.degrees.len();
+    let harmonics = basis.len();
     let (mut design, mut residual, mut times_d) = (DMatrix::zeros(data, harmonics), DVector::zeros(data), Vec::new());
     let mut noise = DMatrix::zeros(data, data);
     let mut row = 0;
@@ -115,12 +115,12 @@ fn ln_z_of_profiles_and_a_light_curve_is_that_of_dense_algebra() {
     let found = Evidence::new(field, &basis.degrees, &epochs, coefficients, exact).unwrap().ln_evidence();
     assert!((found - ln_z).abs() < 1e-6, "{found}, not {ln_z}");
     // velocities are those of the profiles, parameters those of all
-    let expansion = marginal.expansion(imager, &basis, &[Parameter::Inclination]).unwrap();
+    let expansion = marginal.expansion(imager, &[Parameter::Inclination]).unwrap();
     assert_eq!((expansion.profiles(), expansion.information.nrows()), (5, 6));
 }
 
 /// The error of ln lifetime from the second difference of ln Z at a field that is known but for that.
-fn lifetime_error(scene: &Scene, basis: &Basis, lifetime_d: f64) -> f64 {
+fn lifetime_error(scene: &Scene, basis: &Arc<Basis>, lifetime_d: f64) -> f64 {
     const STEP: f64 = 0.3;
     let at = |step: f64| marginal(scene, basis, lifetime_d * f64::exp(step)).ln_evidence();
     let bend = (2.0 * at(0.0) - at(STEP) - at(-STEP)) / (STEP * STEP);
@@ -132,7 +132,7 @@ fn a_light_curve_tells_the_lifetime_of_spots() {
     let light = json!({ "simulate": { "cadence_d": 0.2, "sigma": 3e-4 } });
     let [with, without] = [Some(light), None].map(|light| {
         let scene = scene(&config(5, 8, 250, light));
-        lifetime_error(&scene, &Basis::new(&scene.imager.grid), 12.0)
+        lifetime_error(&scene, &Arc::new(Basis::new(&scene.imager.grid)), 12.0)
     });
     assert!(with < 0.5 * without, "{with} with a light curve, {without} without");
 }
@@ -147,7 +147,7 @@ fn light_curves_halve_the_error_of_the_lifetime_and_do_not_bias_k() {
     for seed in 1..=STARS {
         let [with, without] = [Some(light.clone()), None].map(|light| {
             let scene = scene(&config(seed, 16, 500, light));
-            let basis = Basis::new(&scene.imager.grid);
+            let basis = Arc::new(Basis::seen(&scene.imager, &scene.settings.values));
             let known = Known { jitter_kms: Some(0.0), ..Known::default() };
             let fitted = fit(&scene.imager, &basis, scene.settings.values, known, None).unwrap().marginal;
             let lifetime_d = fitted.assumed.field.kernel.lifetime.days().unwrap();
@@ -159,7 +159,7 @@ fn light_curves_halve_the_error_of_the_lifetime_and_do_not_bias_k() {
             };
             let error = ((2.0 * at(0.0) - at(0.3) - at(-0.3)) / 0.09).max(0.0).sqrt().recip();
             // along the true orbit: its velocities are those of the values
-            let quadratic = fitted.expansion(&scene.imager, &basis, &[]).unwrap();
+            let quadratic = fitted.expansion(&scene.imager, &[]).unwrap();
             let orbit = scene.settings.values.state().motion.first.orbit;
             let unit =
                 DVector::from_iterator(16, quadratic.cycles.iter().map(|c| orbit.velocity_kms(*c) / orbit.k_kms));

@@ -1,10 +1,10 @@
 //! The marginal likelihood of stars that change, against an independent implementation (`tests/data/evolving`).
 
-use dimcmc::internals::field::Lifetime;
+use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
-use dimcmc::internals::surface::evolving_map::{Basis, Held, Marginal, MarginalPosterior, fit};
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Design, Held, Marginal, MarginalPosterior, fit};
 use dimcmc::internals::surface::{Change, Known};
 use dimcmc::{Config, Scene};
 use serde_json::json;
@@ -40,10 +40,10 @@ fn the_highest_peak_is_that_of_another_implementation() {
             jitter_kms: Some(0.0),
             ..Known::default()
         };
-        let basis = Basis::new(&scene.imager.grid);
+        let basis = Arc::new(Basis::seen(&scene.imager, &values));
         let fitted = fit(&scene.imager, &basis, values, known, None).unwrap();
         assert!(fitted.at_bounds.is_empty());
-        let quadratic = fitted.marginal.expansion(&scene.imager, &basis, &[]).unwrap().velocities(&[]);
+        let quadratic = fitted.marginal.expansion(&scene.imager, &[]).unwrap().velocities(&[]);
         let search = Search::new(&quadratic, &frequencies, SearchSettings::default()).unwrap();
         let best = search.best();
         let sigma = number("peak", "sigma_k_kms");
@@ -105,7 +105,7 @@ fn a_planet_of_a_star_without_spots_is_found() {
 #[test]
 fn a_prior_of_the_field_counts_in_its_fit() {
     let (scene, values, _) = star("slow-planet", 600);
-    let basis = Basis::new(&scene.imager.grid);
+    let basis = Arc::new(Basis::seen(&scene.imager, &values));
     let even = Known { jitter_kms: Some(0.0), slope: Some(0.5), amplitude: Some(0.24), ..Known::default() };
     let fitted = |prior: Option<Prior>| {
         let known = Known { priors: [None, None, prior], ..even };
@@ -134,7 +134,7 @@ fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
         .with("observations.simulate.snr", 300.0)
         .with("imaging", json!({ "objective": "marginal-likelihood", "pixels": 200 }));
     let scene = Scene::new(&config).unwrap();
-    let basis = Basis::exact(&scene.imager.grid);
+    let basis = Arc::new(Basis::seen(&scene.imager, &scene.settings.values).exactly());
     let known = Known { jitter_kms: Some(0.0), ..Known::default() };
     let best = fit(&scene.imager, &basis, scene.settings.values, known, None).unwrap();
     let days = best.marginal.assumed.field.kernel.lifetime.days().unwrap();
@@ -149,6 +149,32 @@ fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
         let there = Marginal::new(&scene.imager, &basis, design, values, beside, Some(&best.marginal)).unwrap();
         let there = there.ln_evidence();
         assert!(there < best.ln_evidence + 0.02, "{beside:?}: {there}, {}", best.ln_evidence);
+    }
+}
+
+/// Half of the harmonics say all that the data know: of other fields, and of stars a standard error or two away.
+#[test]
+fn harmonics_that_no_data_see_change_nothing() {
+    let (scene, values, _) = star("slow-planet", 1200);
+    let all = Arc::new(Basis::new(&scene.imager.grid).exactly());
+    let seen = Arc::new(Basis::seen(&scene.imager, &values).exactly());
+    assert!(10 * seen.len() < 7 * all.len(), "{} of {}", seen.len(), all.len());
+    let ln_z = |basis: &Arc<Basis>, values: ParameterValues, [amplitude, slope, days]: [f64; 3]| {
+        let design = Arc::new(Design::new(&scene.imager, basis, &values.state()));
+        let spectrum = Spectrum { amplitude, slope, break_degree: 7.0 };
+        let field = Field { spectrum, kernel: Kernel::of(Lifetime::Days(days)) };
+        let assumed = Assumed { field, jitter_kms: 0.0 };
+        Marginal::new(&scene.imager, basis, design, values, assumed, None).unwrap().ln_evidence()
+    };
+    let mut other = values;
+    for (parameter, off) in [(Parameter::Inclination, 3.0), (Parameter::Vsini, 0.2)] {
+        other.set(parameter, values[parameter] + off);
+    }
+    for (values, most) in [(values, 1e-3), (other, 5e-3)] {
+        for field in [[0.24, 0.53, 33.0], [0.3, 0.4, 20.0], [0.15, 1.5, 60.0]] {
+            let [all, seen] = [&all, &seen].map(|basis| ln_z(basis, values, field));
+            assert!((seen - all).abs() < most, "{field:?}: {seen}, with all {all}");
+        }
     }
 }
 

@@ -66,8 +66,8 @@ fn dense(scene: &Scene, field: &Field, jitter_kms: f64, maps: &DMatrix<f64>, par
     let h = 1e-3;
     let slopes = (depths(h, maps) - depths(-h, maps)) / (2.0 * h);
     let bins = slopes.len() / imager.profiles().count();
-    let mut jacobian = DMatrix::zeros(slopes.len(), basis.degrees.len());
-    for harmonic in 0..basis.degrees.len() {
+    let mut jacobian = DMatrix::zeros(slopes.len(), basis.len());
+    for harmonic in 0..basis.len() {
         let moved = |h: f64| {
             let mut maps = maps.clone();
             maps.row_mut(harmonic).add_scalar_mut(h);

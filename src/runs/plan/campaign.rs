@@ -253,7 +253,7 @@ fn taken(config: &Config) -> Result<Taken, CampaignError> {
     let known = scene.surface().field.unwrap_or_default();
     let mut values: ParameterValues = scene.settings.values;
     values.set(Parameter::K, 0.0);
-    let fitted = fit(&scene.imager, &Basis::new(&scene.imager.grid), values, known, None);
+    let fitted = fit(&scene.imager, &Arc::new(Basis::new(&scene.imager.grid)), values, known, None);
     let fitted = fitted.map_err(|source| CampaignError::Field { path: scene.settings.path.clone(), source })?;
     Ok(Taken { observations: scene.observations, marginal: Arc::new(fitted.marginal) })
 }

@@ -13,6 +13,7 @@ use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
 use crate::surface::{ConstantVelocity, Known};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Standard deviation of the prior (km/s), around 0.
 pub const PRIOR_KMS: f64 = 3.0;
@@ -49,7 +50,7 @@ pub fn hold(
     known: Known,
     frequencies: Option<&Frequencies>,
 ) -> Result<Vec<HeldZeroPoint>, FieldError> {
-    let basis = Basis::rough(&imager.grid);
+    let basis = Arc::new(Basis::rough(&imager.grid));
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(Parameter::SpotLifetime.usual()));
     let known = Known { lifetime: Some(lifetime), ..known };
     let systemic: Vec<Nuisance> = nuisances.iter().copied().filter(|n| n.parameter == Parameter::Vsys).collect();
@@ -57,7 +58,7 @@ pub fn hold(
     values.set(Parameter::K, 0.0);
     let mut near = None;
     for _ in 0..ROUNDS {
-        let here = linearised((imager, &basis), usual(imager, &basis, values, known, near.as_ref())?, &systemic)?;
+        let here = linearised(imager, usual(imager, &basis, values, known, near.as_ref())?, &systemic)?;
         let orbit = frequencies.and_then(|frequencies| best_orbit(&here.quadratic, frequencies));
         let Some(found) = here.constants(imager, &systemic, orbit.as_ref()) else { break };
         if let Some(Peak { porb_over_prot, orbit, .. }) = orbit {

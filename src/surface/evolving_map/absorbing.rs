@@ -6,7 +6,7 @@
 //! amplitude rose together. So fields lie on one line, and a few steps along it are enough.
 
 use super::climb::{assumed_at, limits, place};
-use super::{Basis, Fitted, Known, Marginal};
+use super::{Fitted, Known, Marginal};
 use crate::surface::imaging::Imager;
 use std::f64::consts::LN_2;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ impl Fitted {
     /// Those of `of`. Where there is no star with a field, there are no further steps.
     pub(super) fn absorbing<T, E>(
         &self,
-        (imager, basis): (&Imager, &Basis),
+        imager: &Imager,
         known: &Known,
         of: impl Fn(&Marginal) -> Result<T, E>,
     ) -> Result<Vec<T>, E> {
@@ -50,7 +50,7 @@ impl Fitted {
             (0..3).filter(|i| free[*i]).for_each(|i| to[i] = to[i].clamp(limits[i].0, limits[i].1));
             let there = assumed_at(to, &from.assumed);
             let at = |nearby: Option<&Marginal>| {
-                Marginal::new(imager, basis, Arc::clone(&here.design), here.values, there, nearby)
+                Marginal::new(imager, &here.basis, Arc::clone(&here.design), here.values, there, nearby)
             };
             at(Some(from)).or_else(|_| at(None)).ok()
         };

@@ -88,8 +88,8 @@ impl Change {
         nuisances: &[Nuisance],
         known: Known,
     ) -> Result<Self, NoFit> {
-        let basis = Basis::rough(&imager.grid);
-        let with_best_orbit = |near: &Marginal| with_best_orbit(near, imager, &basis, values, frequencies, nuisances);
+        let basis = Arc::new(Basis::rough(&imager.grid));
+        let with_best_orbit = |near: &Marginal| with_best_orbit(near, imager, values, frequencies, nuisances);
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
         let shortened = |still: &Fitted| shortened(imager, &basis, still, time_base_d);
         let unchanging = known.unchanging();
@@ -148,7 +148,7 @@ impl Shortened {
 /// The lifetime with the highest ln Z, all else as in `still`; `None` where no lifetime has maps.
 fn shortened(
     imager: &Imager,
-    basis: &Basis,
+    basis: &Arc<Basis>,
     still: &Fitted,
     time_base_d: f64,
 ) -> Result<Option<Shortened>, FieldError> {
@@ -186,13 +186,12 @@ fn without_planet(mut values: ParameterValues) -> ParameterValues {
 fn with_best_orbit(
     near: &Marginal,
     imager: &Imager,
-    basis: &Basis,
     mut values: ParameterValues,
     frequencies: &Frequencies,
     nuisances: &[Nuisance],
 ) -> Result<ParameterValues, FieldError> {
     let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-    let quadratic = near.expansion(imager, basis, &stellar)?.velocities(nuisances);
+    let quadratic = near.expansion(imager, &stellar)?.velocities(nuisances);
     let trials = orbits::scan(&quadratic, &frequencies.per_cycle);
     let best = trials
         .iter()

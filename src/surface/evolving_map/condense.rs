@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 
 /// Spots of which no more than [`LEFT_OUT`] of the variance of the noise is lost in a profile: rougher and larger than
 /// any. Those of slope 0 and an amplitude of 0.85 have less at every degree.
-const ROUGHEST: Spectrum = Spectrum { amplitude: 1.0, slope: 0.3, break_degree: 0.0 };
+pub(super) const ROUGHEST: Spectrum = Spectrum { amplitude: 1.0, slope: 0.3, break_degree: 0.0 };
 const LEFT_OUT: f64 = 1e-3;
 
 /// The profiles in those numbers.

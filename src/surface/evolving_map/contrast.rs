@@ -44,7 +44,7 @@ impl FittedContrast {
 /// [`FieldError`].
 pub fn fit_contrast(imager: &Imager, near: &Fitted, set: usize, given: f64) -> Result<FittedContrast, FieldError> {
     let near = &near.marginal;
-    let basis = Basis::coarse(&imager.grid, DEGREE);
+    let basis = Arc::new(Basis::coarse(&imager.grid, DEGREE));
     let [centre, here] = [given, imager.contrast_of(set)].map(|contrast| (1.0 - contrast).ln());
     let bounds = (DARKNESS.0.ln(), DARKNESS.1.ln());
     let height = |place: f64| {

@@ -6,9 +6,11 @@ use super::condense::Condensed;
 use super::light::Light;
 use crate::field::{Epoch, Jacobian};
 use crate::star::{Response, StarState};
+use crate::surface::expansion::VELOCITY_STEP_KMS;
 use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Line depth and continuum of every profile for each harmonic, before the division of one by the other; depths in the
@@ -17,7 +19,7 @@ use std::sync::Arc;
 pub struct Design {
     response: Response,
     condensed: Arc<Condensed>,
-    /// Of each profile (numbers, H).
+    /// Of each profile (H, numbers).
     line: Vec<Arc<DMatrix<f64>>>,
     /// (H, profiles).
     continuum: DMatrix<f64>,
@@ -25,6 +27,19 @@ pub struct Design {
     mean_line: Vec<DVector<f64>>,
     mean_continuum: Vec<f64>,
     light: Light,
+    /// How depths change with a velocity, where that is asked for often.
+    moving: Option<Arc<Moving>>,
+}
+
+/// Change of the line depth of every profile by a velocity (km/s).
+#[derive(Debug)]
+struct Moving {
+    /// The star at whose velocities it is.
+    state: StarState,
+    /// For each harmonic, of each profile (H, numbers).
+    line: Vec<DMatrix<f64>>,
+    /// Of a star that is spotted alike all over.
+    mean_line: Vec<DVector<f64>>,
 }
 
 impl Design {
@@ -40,38 +55,49 @@ impl Design {
         (response, state): (Response, &StarState),
         like: Option<&Design>,
     ) -> Self {
-        let change = |map: &[f64]| {
-            let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
-            response.change(map, &mut line, &mut continuum);
-            (line, continuum)
-        };
-        let columns: Vec<(Vec<f64>, Vec<f64>)> =
-            (0..basis.degrees.len()).into_par_iter().map(|h| change(basis.on_pixels.column(h).as_slice())).collect();
-        let of_profile = |k: usize| {
-            let bins = response.bins(k);
-            let mut line = DMatrix::zeros(bins.len(), columns.len());
-            for (mut to, (from, _)) in line.column_iter_mut().zip(&columns) {
-                to.copy_from_slice(&from[bins.clone()]);
-            }
-            line
-        };
-        let lines: Vec<DMatrix<f64>> = (0..response.profiles()).map(of_profile).collect();
-        let continuum = DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]);
-        // of many profiles it is hundreds of megabytes
-        drop(columns);
+        let (lines, continuum) = of_harmonics(&response, basis);
         let [(bare, _), (mean, mean_continuum)] = [0.0, MEAN_FILLING].map(|filling| uniform(&response, filling));
         let condensed = match like {
             Some(like) => Arc::clone(&like.condensed),
             None => Arc::new(Condensed::new(imager, basis, (&response, state), &lines, &bare)),
         };
-        let line = lines.par_iter().enumerate().map(|(k, line)| Arc::new(condensed.tell(k, line))).collect();
-        let mean = |k: usize| {
-            let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &mean[response.bins(k)]);
-            condensed.tell(k, &bins).column(0).into_owned()
-        };
-        let mean_line = (0..response.profiles()).map(mean).collect();
+        let line = told(&condensed, &lines).into_iter().map(Arc::new).collect();
+        let mean_line = told_each(&condensed, &response, &mean);
         let light = Light::new(imager, basis, state);
-        Design { response, condensed, line, continuum, mean_line, mean_continuum, light }
+        Design { response, condensed, line, continuum, mean_line, mean_continuum, light, moving: None }
+    }
+
+    /// With how depths change with the velocities of the star at `state`, that of the design: two designs' work, which
+    /// some dozen maps make good.
+    #[must_use]
+    pub fn moving(mut self, imager: &Imager, basis: &Basis, state: &StarState) -> Self {
+        let at = |h: f64| {
+            let shifted = StarState { vsys_kms: state.vsys_kms + h, ..*state };
+            let response = imager.with_velocities(&self.response, &shifted);
+            let (lines, _) = of_harmonics(&response, basis);
+            let (mean, _) = uniform(&response, MEAN_FILLING);
+            (told(&self.condensed, &lines), told_each(&self.condensed, &response, &mean))
+        };
+        let ((above, mean_above), (below, mean_below)) = (at(VELOCITY_STEP_KMS), at(-VELOCITY_STEP_KMS));
+        let line = above.into_iter().zip(below).map(|(a, b)| (a - b) / (2.0 * VELOCITY_STEP_KMS)).collect();
+        let means = mean_above.into_iter().zip(mean_below);
+        let mean_line = means.map(|(a, b)| (a - b) / (2.0 * VELOCITY_STEP_KMS)).collect();
+        self.moving = Some(Arc::new(Moving { state: *state, line, mean_line }));
+        self
+    }
+
+    /// How the numbers of each profile change with its velocity, for maps of these coefficients (H, epochs), if that is
+    /// known for the star at `state` without a look at the pixels.
+    pub(super) fn known_slopes(&self, state: &StarState, maps: &DMatrix<f64>) -> Option<Vec<DMatrix<f64>>> {
+        let moving = self.moving.as_ref().filter(|moving| moving.state == *state)?;
+        let slope = |k: usize| {
+            let coefficients = maps.column(k);
+            let q = 1.0 - self.response.contrast(k);
+            let continuum = self.mean_continuum[k] - q * self.continuum.column(k).dot(&coefficients);
+            let slope = (&moving.mean_line[k] - moving.line[k].tr_mul(&coefficients) * q) / continuum;
+            DMatrix::from_column_slice(slope.len(), 1, slope.as_slice())
+        };
+        Some((0..self.response.profiles()).map(slope).collect())
     }
 
     /// Columns over the bins of each profile in its numbers.
@@ -90,6 +116,21 @@ impl Design {
         brightness
     }
 
+    /// What the data tell of the harmonics `of` one degree (harmonics, harmonics): `J^T N^-1 J` of lines, of continua
+    /// by which they are divided, and of light curves, each for itself, summed.
+    pub(super) fn information(&self, imager: &Imager, of: Range<usize>) -> DMatrix<f64> {
+        let mut information = self.light.information(imager, of.clone());
+        for (k, line) in self.line.iter().enumerate() {
+            let scale = (1.0 - self.response.contrast(k)) / self.mean_continuum[k];
+            let line = line.rows_range(of.clone()) * scale;
+            let continuum = self.continuum.rows_range(of.clone()).column(k) * scale;
+            let depth = self.mean_line[k].norm_squared() / self.mean_continuum[k].powi(2);
+            information += &line * line.transpose();
+            information.ger(depth, &continuum, &continuum, 1.0);
+        }
+        information
+    }
+
     /// The response that it was made with.
     pub fn response(&self) -> &Response {
         &self.response
@@ -99,7 +140,7 @@ impl Design {
     fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
         let q = 1.0 - self.response.contrast(k);
         let continuum = self.mean_continuum[k] - q * self.continuum.column(k).dot(coefficients);
-        ((&self.mean_line[k] - &*self.line[k] * coefficients * q) / continuum, continuum)
+        ((&self.mean_line[k] - self.line[k].tr_mul(coefficients) * q) / continuum, continuum)
     }
 
     /// The profiles, then the bins of light curves, linearised around maps of these coefficients (H, epochs), without
@@ -160,6 +201,42 @@ impl Design {
             beside: self.condensed.beside[k],
         }
     }
+}
+
+/// Line depths of every profile for each harmonic (bins, H), and continua (H, profiles).
+fn of_harmonics(response: &Response, basis: &Basis) -> (Vec<DMatrix<f64>>, DMatrix<f64>) {
+    let change = |map: &[f64]| {
+        let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
+        response.change(map, &mut line, &mut continuum);
+        (line, continuum)
+    };
+    // of many profiles it is hundreds of megabytes
+    let columns: Vec<(Vec<f64>, Vec<f64>)> =
+        (0..basis.len()).into_par_iter().map(|h| change(basis.on_pixels.column(h).as_slice())).collect();
+    let of_profile = |k: usize| {
+        let bins = response.bins(k);
+        let mut line = DMatrix::zeros(bins.len(), columns.len());
+        for (mut to, (from, _)) in line.column_iter_mut().zip(&columns) {
+            to.copy_from_slice(&from[bins.clone()]);
+        }
+        line
+    };
+    let lines = (0..response.profiles()).map(of_profile).collect();
+    (lines, DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]))
+}
+
+/// Lines (bins, H) of each profile in its numbers, turned (H, numbers).
+fn told(condensed: &Condensed, lines: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+    lines.par_iter().enumerate().map(|(k, line)| condensed.tell(k, line).transpose()).collect()
+}
+
+/// Depths of all bins in the numbers of each profile.
+fn told_each(condensed: &Condensed, response: &Response, depths: &[f64]) -> Vec<DVector<f64>> {
+    let of_profile = |k: usize| {
+        let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &depths[response.bins(k)]);
+        condensed.tell(k, &bins).column(0).into_owned()
+    };
+    (0..response.profiles()).map(of_profile).collect()
 }
 
 /// Line depth and continuum of every profile of a star that is spotted alike all over.

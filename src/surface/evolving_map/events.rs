@@ -82,7 +82,7 @@ pub fn events(
     if count < FEWEST {
         return Ok(found.into_iter().flatten().collect());
     }
-    let basis = Basis::coarse(&imager.grid, DEGREE);
+    let basis = Arc::new(Basis::coarse(&imager.grid, DEGREE));
     let design = Arc::new(Design::new(imager, &basis, &values.state()));
     let with_jitter = Known { jitter_kms: None, ..*known };
     let mut marginal = Marginal::new(imager, &basis, design, values, near, None)?;
@@ -93,7 +93,7 @@ pub fn events(
             let start = Fitted::near(marginal);
             marginal = fit(&of_all, &basis, values, with_jitter, Some(&start))?.marginal;
         }
-        let ratios = over_usual(&of_all, &marginal.predicted_chi2(&of_all, &basis)?);
+        let ratios = over_usual(&of_all, &marginal.predicted_chi2(&of_all)?);
         let chance = |k: usize| chi2_exceeds(ratios[k].0 * ratios[k].1, ratios[k].1);
         let fails = |k: &usize| by_hand[*k] == ByHand::Open && found[*k].is_none() && chance(*k) < RARE / count as f64;
         let failing: Vec<usize> = (0..count).filter(fails).collect();

@@ -1,6 +1,6 @@
 //! ln Z to second order in the velocities of the profiles and in the star's own parameters.
 
-use super::{Basis, Design, Marginal};
+use super::{Design, Marginal};
 use crate::field::{FieldError, Quadratic};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::offset::Common;
@@ -21,21 +21,16 @@ impl Marginal {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn expansion(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
-        self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, basis, stellar)?)
+    pub fn expansion(&self, imager: &Imager, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
+        self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, stellar)?)
     }
 
     /// The same, and with those zero points of data sets held that are otherwise integrated out.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn expansions(
-        &self,
-        imager: &Imager,
-        basis: &Basis,
-        stellar: &[Parameter],
-    ) -> Result<[Expansion; 2], FieldError> {
-        let quadratic = self.quadratic(imager, basis, stellar)?;
+    pub fn expansions(&self, imager: &Imager, stellar: &[Parameter]) -> Result<[Expansion; 2], FieldError> {
+        let quadratic = self.quadratic(imager, stellar)?;
         let held = self.expanded(imager, stellar, quadratic.clone());
         Ok([self.with_zero_points_integrated(imager, stellar, quadratic)?, held])
     }
@@ -48,12 +43,11 @@ impl Marginal {
     pub fn without_each<T: Send>(
         &self,
         imager: &Imager,
-        basis: &Basis,
         stellar: &[Parameter],
         groups: &[Vec<usize>],
         then: impl Fn(&Expansion) -> T + Sync,
     ) -> Result<Vec<Result<T, FieldError>>, FieldError> {
-        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
+        let (misfits, slopes) = self.misfits_and_slopes(imager, stellar);
         let (epochs, profiles) = (misfits.len(), self.design.response().profiles());
         let then = |group: &[usize], quadratic: Quadratic| {
             let quadratic = summed(&quadratic, epochs - group.len(), profiles - group.len(), stellar.len());
@@ -70,8 +64,8 @@ impl Marginal {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn predicted_chi2(&self, imager: &Imager, basis: &Basis) -> Result<Vec<f64>, FieldError> {
-        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, &[]);
+    pub fn predicted_chi2(&self, imager: &Imager) -> Result<Vec<f64>, FieldError> {
+        let (misfits, slopes) = self.misfits_and_slopes(imager, &[]);
         let mut all = self.settled.evidence.predicted_chi2(&misfits, &slopes)?;
         all.truncate(self.design.response().profiles());
         Ok(all)
@@ -95,23 +89,18 @@ impl Marginal {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn known_zero_points(
-        &self,
-        imager: &Imager,
-        basis: &Basis,
-        stellar: &[Parameter],
-    ) -> Result<Expansion, FieldError> {
-        Ok(self.expanded(imager, stellar, self.quadratic(imager, basis, stellar)?))
+    pub fn known_zero_points(&self, imager: &Imager, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
+        Ok(self.expanded(imager, stellar, self.quadratic(imager, stellar)?))
     }
 
     /// ln Z, the jitter counted and zero points of data sets integrated out.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
+    pub fn ln_evidence_of_sets(&self, imager: &Imager) -> Result<f64, FieldError> {
         match imager.has_shared_velocities() {
             false => Ok(self.ln_evidence()),
-            true => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
+            true => Ok(self.expansion(imager, &[])?.log_likelihood),
         }
     }
 
@@ -130,43 +119,33 @@ impl Marginal {
         }
     }
 
-    fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
-        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
+    fn quadratic(&self, imager: &Imager, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
+        let (misfits, slopes) = self.misfits_and_slopes(imager, stellar);
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;
         let quadratic = summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len());
         with_night_offsets(imager, quadratic)
     }
 
-    fn misfits_and_slopes(
-        &self,
-        imager: &Imager,
-        basis: &Basis,
-        stellar: &[Parameter],
-    ) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
+    fn misfits_and_slopes(&self, imager: &Imager, stellar: &[Parameter]) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
         let epochs = self.design.epochs(imager, &self.settled.coefficients);
-        (epochs.into_iter().map(|epoch| epoch.misfit).collect(), self.slopes_of_epochs(imager, basis, stellar))
+        (epochs.into_iter().map(|epoch| epoch.misfit).collect(), self.slopes_of_epochs(imager, stellar))
     }
 
     /// How the numbers of each epoch change with a velocity and with the star's parameters, at the most probable maps
     /// (numbers, 1 + parameters).
-    pub(super) fn slopes_of_epochs(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+    pub(super) fn slopes_of_epochs(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
         if stellar.is_empty() {
-            return self.velocity_slopes(imager, basis).to_vec();
+            return self.velocity_slopes(imager).to_vec();
         }
-        let mut slopes = self.design.condensed(&self.slopes(imager, basis, stellar));
-        slopes.extend(self.flux_slopes(imager, basis, stellar));
+        let mut slopes = self.design.condensed(&self.slopes(imager, stellar));
+        slopes.extend(self.flux_slopes(imager, stellar));
         slopes
     }
 
     /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable
     /// maps (bins, 1 + parameters).
-    pub(in crate::surface) fn slopes(
-        &self,
-        imager: &Imager,
-        basis: &Basis,
-        stellar: &[Parameter],
-    ) -> Vec<DMatrix<f64>> {
-        self.design.slopes(imager, &self.values, &self.brightness(basis), stellar)
+    pub(in crate::surface) fn slopes(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+        self.design.slopes(imager, &self.values, &self.brightness(), stellar)
     }
 }
 

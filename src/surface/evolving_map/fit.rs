@@ -76,7 +76,7 @@ impl Fitted {
 /// found from those `near` by.
 pub(in crate::surface) fn usual(
     imager: &Imager,
-    basis: &Basis,
+    basis: &Arc<Basis>,
     values: ParameterValues,
     known: Known,
     near: Option<&Marginal>,
@@ -96,12 +96,17 @@ pub(in crate::surface) fn usual(
 /// [`NoFit`]: of the last attempt, where none succeeds.
 pub fn fit(
     imager: &Imager,
-    basis: &Basis,
+    basis: &Arc<Basis>,
     values: ParameterValues,
     known: Known,
     near: Option<&Fitted>,
 ) -> Result<Fitted, NoFit> {
-    let design = Arc::new(Design::new(imager, basis, &values.state()));
+    let state = values.state();
+    let design = Design::new(imager, basis, &state);
+    let design = Arc::new(match known.jitter_kms {
+        Some(0.0) => design,
+        _ => design.moving(imager, basis, &state),
+    });
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
@@ -118,7 +123,7 @@ pub fn fit(
         (None, Some(begin), _) => (begin, None),
         (None, None, Some((assumed, hessian))) => (at(assumed, None)?, hessian),
         (None, None, None) => {
-            let rough = basis.roughly();
+            let rough = Arc::new(basis.roughly());
             // of many profiles each is hundreds of megabytes: only the best so far is kept
             let higher = |best, next| higher(best, next, &known);
             let start = |of_field: Vec<Assumed>| {
@@ -155,7 +160,7 @@ pub fn fit(
 /// `None` where there are few, the share does not tell it, or nothing is left to tell.
 fn by_a_share(
     imager: &Imager,
-    basis: &Basis,
+    basis: &Arc<Basis>,
     values: ParameterValues,
     known: Known,
 ) -> Option<(Assumed, Option<Matrix4<f64>>)> {

@@ -45,7 +45,7 @@ impl MarginalPosterior {
     fn expand(&self) -> Result<Expansion, FieldError> {
         let all = self.coordinates();
         let (star, field): (Vec<Parameter>, Vec<Parameter>) = all.iter().partition(|p| STELLAR.contains(p));
-        let own = self.reference.expansion(&self.imager, &self.basis, &star)?;
+        let own = self.reference.expansion(&self.imager, &star)?;
         let (profiles, known) = (own.profiles(), own.centre.len());
         let mut information = own.information.clone().resize(known + field.len(), known + field.len(), 0.0);
         let mut gradient = own.gradient.clone().resize_vertically(known + field.len(), 0.0);
@@ -130,11 +130,11 @@ impl MarginalPosterior {
         let here: Marginal = self.marginal_at(values, star)?;
         match slopes {
             None => {
-                let ln_evidence = here.ln_evidence_of_sets(&self.imager, &self.basis)?;
+                let ln_evidence = here.ln_evidence_of_sets(&self.imager)?;
                 Ok(Displaced { ln_evidence, slopes: None })
             }
             Some(star) => {
-                let expansion = here.expansion(&self.imager, &self.basis, star)?;
+                let expansion = here.expansion(&self.imager, star)?;
                 Ok(Displaced { ln_evidence: expansion.log_likelihood, slopes: Some(expansion.gradient) })
             }
         }

@@ -14,6 +14,7 @@ use crate::surface::imaging::Imager;
 use crate::surface::photometry::{FluxBin, LightCurve};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Standard deviation of the prior of a segment's level, and of the change from its middle to its end by its slope, in
 /// units of its mean flux: what spots that no profile knows of may take away, and instruments drift by.
@@ -60,6 +61,14 @@ impl Light {
     /// Number of bins.
     pub fn len(&self) -> usize {
         self.jacobian.nrows()
+    }
+
+    /// `J^T N^-1 J` of all bins for the harmonics `of` one degree (harmonics, harmonics).
+    pub fn information(&self, imager: &Imager, of: Range<usize>) -> DMatrix<f64> {
+        let mut rows = self.jacobian.columns_range(of).into_owned();
+        let bins = imager.light_curves.iter().flat_map(|curve| &curve.bins);
+        rows.row_iter_mut().zip(bins).for_each(|(mut row, bin)| row /= bin.sigma);
+        rows.tr_mul(&rows)
     }
 
     /// The bins around maps of these coefficients (H, bins), without slopes.
@@ -145,7 +154,7 @@ pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
 impl Marginal {
     /// How the flux of each bin changes with a velocity, which is not at all, and with the star's parameters, at the
     /// most probable maps (1, 1 + parameters).
-    pub(super) fn flux_slopes(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+    pub(super) fn flux_slopes(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
         let profiles = self.design.response().profiles();
         let maps = self.settled.coefficients.columns_range(profiles..);
         let mut slopes = vec![DMatrix::zeros(1, 1 + stellar.len()); maps.ncols()];
@@ -158,7 +167,7 @@ impl Marginal {
             let [above, below] = [h, -h].map(|h| {
                 let mut values = self.values;
                 values.set(*parameter, values[*parameter] + h);
-                Light::new(imager, basis, &values.state()).fluxes(maps.as_view())
+                Light::new(imager, &self.basis, &values.state()).fluxes(maps.as_view())
             });
             slopes.iter_mut().enumerate().for_each(|(k, own)| own[1 + s] = (above[k] - below[k]) / (2.0 * h));
         }

@@ -1,6 +1,6 @@
 //! The star of a fit as every surface model gives it: linearised, with its spots as a field.
 
-use super::{Assumed, Basis, Fitted};
+use super::{Assumed, Fitted};
 use crate::field::{Field, FieldError};
 use crate::model::Parameter;
 use crate::surface::expansion::{Nuisance, STELLAR, of_the_star};
@@ -10,12 +10,12 @@ use std::sync::Arc;
 
 /// The star of a fit.
 pub(in crate::surface) fn linearised(
-    (imager, basis): (&Imager, &Basis),
+    imager: &Imager,
     fitted: Fitted,
     nuisances: &[Nuisance],
 ) -> Result<Linearised, FieldError> {
     let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-    let [expansion, held] = fitted.marginal.expansions(imager, basis, &stellar)?;
+    let [expansion, held] = fitted.marginal.expansions(imager, &stellar)?;
     let quadratic = expansion.velocities(nuisances);
     Ok(Linearised {
         expansion,

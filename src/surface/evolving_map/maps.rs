@@ -20,7 +20,12 @@ impl Maps {
     /// At any times (d), on the pixels of `basis`, from the most probable maps of the profiles.
     pub fn at(settled: &Settled, basis: &Basis, times_d: &[f64]) -> Self {
         let filling = basis.filling(&settled.evidence.coefficients_at(times_d));
-        let sd = settled.evidence.standard_deviations(&basis.on_pixels.transpose(), times_d);
+        let mut sd = settled.evidence.standard_deviations(&basis.on_pixels.transpose(), times_d);
+        // what no data see is as it was before them
+        let unseen = basis.unseen_variances(&settled.evidence.field().spectrum);
+        for mut map in sd.column_iter_mut() {
+            map.zip_apply(&unseen, |sd, unseen| *sd = sd.hypot(unseen.sqrt()));
+        }
         Maps { filling, sd }
     }
 }
@@ -30,34 +35,34 @@ impl Marginal {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn without_jitter(&self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
+    pub fn without_jitter(&self, imager: &Imager) -> Result<Self, FieldError> {
         let Settled { coefficients, .. } = &self.settled;
         let epochs = self.design.epochs(imager, coefficients);
+        let basis = &self.basis;
         let compression = basis.settling.compression;
         let evidence = Evidence::new(self.assumed.field, &basis.degrees, &epochs, coefficients, compression)?;
         let settled = Settled { evidence, ..self.settled.clone() };
         Ok(Marginal { assumed: Assumed { jitter_kms: 0.0, ..self.assumed }, settled, ..self.clone() })
     }
 
-    /// At `values`, from maps `nearby`, where the jitter is noise of the profiles, along their slopes at the most
-    /// probable maps. Maps that know nothing of it explain zero points by spots, so slopes and maps are found in turn,
+    /// At `values`, by a star `nearby` from maps of these coefficients (H, epochs), where the jitter is noise of the
+    /// profiles, along their slopes at the most probable maps. Maps that know nothing of it explain zero points by spots, so slopes and maps are found in turn,
     /// so many times: slopes of other maps than these would seem to tell the velocities of the profiles from their
     /// zero points.
     ///
     /// # Errors
     /// [`FieldError`].
     pub(super) fn with_jitter(
-        (imager, basis): (&Imager, &Basis),
+        (imager, basis): (&Imager, &Arc<Basis>),
         design: Arc<Design>,
         values: ParameterValues,
         assumed: Assumed,
-        (nearby, times): (&Marginal, usize),
+        (nearby, mut coefficients, times): (&Marginal, DMatrix<f64>, usize),
     ) -> Result<Self, FieldError> {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
-        let mut coefficients = nearby.settled.coefficients.clone();
         let same = Arc::ptr_eq(&design, &nearby.design) && values.state() == nearby.values.state();
         let mut slopes = match same {
-            true => nearby.velocity_slopes(imager, basis).to_vec(),
+            true => nearby.velocity_slopes(imager).to_vec(),
             false => design.velocity_slopes((imager, basis), &values, &coefficients),
         };
         let mut last: Option<Evidence> = None;
@@ -73,12 +78,12 @@ impl Marginal {
         let linearise = |maps: &DMatrix<f64>| design.jittered(imager, maps, &slopes, assumed.jitter_kms);
         let by = Some(last.as_ref().unwrap_or(&nearby.settled.evidence));
         let settled = settle(linearise, sought, coefficients, by, &basis.settling)?;
-        Ok(Marginal::settled_at(design, values, assumed, settled))
+        Ok(Marginal::settled_at((basis, design), values, assumed, settled))
     }
 
     /// How the numbers of each epoch change with a velocity, at the most probable maps (numbers, 1).
-    pub(super) fn velocity_slopes(&self, imager: &Imager, basis: &Basis) -> &[DMatrix<f64>] {
-        let found = || self.design.velocity_slopes((imager, basis), &self.values, &self.settled.coefficients);
+    pub(super) fn velocity_slopes(&self, imager: &Imager) -> &[DMatrix<f64>] {
+        let found = || self.design.velocity_slopes((imager, &self.basis), &self.values, &self.settled.coefficients);
         self.velocity_slopes.get_or_init(found)
     }
 }
@@ -91,8 +96,10 @@ impl Design {
         values: &ParameterValues,
         coefficients: &DMatrix<f64>,
     ) -> Vec<DMatrix<f64>> {
-        let of_profiles = self.slopes(imager, values, &self.brightness(basis, coefficients), &[]);
-        let mut slopes = self.condensed(&of_profiles);
+        let mut slopes = match self.known_slopes(&values.state(), coefficients) {
+            Some(slopes) => slopes,
+            None => self.condensed(&self.slopes(imager, values, &self.brightness(basis, coefficients), &[])),
+        };
         slopes.resize(coefficients.ncols(), DMatrix::zeros(1, 1));
         slopes
     }

@@ -116,6 +116,8 @@ pub struct Marginal {
     pub values: ParameterValues,
     /// What is assumed.
     pub assumed: Assumed,
+    /// The harmonics that maps are made of.
+    pub basis: Arc<Basis>,
     /// The star's response.
     pub design: Arc<Design>,
     /// The most probable maps (their coefficients, a column a profile and then a bin of light curves), and the evidence
@@ -133,41 +135,57 @@ impl Marginal {
     /// [`FieldError`].
     pub fn new(
         imager: &Imager,
-        basis: &Basis,
+        basis: &Arc<Basis>,
         design: Arc<Design>,
         values: ParameterValues,
         assumed: Assumed,
         nearby: Option<&Marginal>,
     ) -> Result<Self, FieldError> {
+        let nearby = nearby.map(|nearby| (nearby, nearby.settled.coefficients.clone()));
+        Marginal::begun((imager, basis), design, values, assumed, nearby)
+    }
+
+    /// The same by a star and field nearby, maps being found from these coefficients (H, epochs).
+    fn begun(
+        (imager, basis): (&Imager, &Arc<Basis>),
+        design: Arc<Design>,
+        values: ParameterValues,
+        assumed: Assumed,
+        nearby: Option<(&Marginal, DMatrix<f64>)>,
+    ) -> Result<Self, FieldError> {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
-        let start = match nearby {
-            Some(nearby) => nearby.settled.coefficients.clone(),
-            None => DMatrix::zeros(basis.degrees.len(), imager.epochs()),
-        };
         let values = assumed.among(values);
-        if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
-            let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
-            return Marginal::with_jitter((imager, basis), design, values, assumed, (nearby, times));
-        }
+        let (by, start) = match nearby {
+            Some((nearby, start)) if assumed.jitter_kms > 0.0 => {
+                let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
+                return Marginal::with_jitter((imager, basis), design, values, assumed, (nearby, start, times));
+            }
+            Some((nearby, start)) => (Some(&nearby.settled.evidence), start),
+            None => (None, DMatrix::zeros(basis.len(), imager.epochs())),
+        };
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
-        let by = nearby.map(|nearby| &nearby.settled.evidence);
         let settled = settle(linearise, sought, start, by, &basis.settling)?;
-        let marginal = Marginal::settled_at(design, values, assumed, settled);
+        let marginal = Marginal::settled_at((basis, design), values, assumed, settled);
         match assumed.jitter_kms {
             0.0 => Ok(marginal),
             _ => {
-                let design = Arc::clone(&marginal.design);
-                Marginal::with_jitter((imager, basis), design, values, assumed, (&marginal, JITTERED))
+                let (design, start) = (Arc::clone(&marginal.design), marginal.settled.coefficients.clone());
+                Marginal::with_jitter((imager, basis), design, values, assumed, (&marginal, start, JITTERED))
             }
         }
     }
 
-    fn settled_at(design: Arc<Design>, values: ParameterValues, assumed: Assumed, settled: Settled) -> Self {
-        Marginal { values, assumed, design, settled, velocity_slopes: OnceLock::new() }
+    fn settled_at(
+        (basis, design): (&Arc<Basis>, Arc<Design>),
+        values: ParameterValues,
+        assumed: Assumed,
+        settled: Settled,
+    ) -> Self {
+        Marginal { values, assumed, basis: Arc::clone(basis), design, settled, velocity_slopes: OnceLock::new() }
     }
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).
-    pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
-        self.design.brightness(basis, &self.settled.coefficients)
+    pub fn brightness(&self) -> DMatrix<f64> {
+        self.design.brightness(&self.basis, &self.settled.coefficients)
     }
 }

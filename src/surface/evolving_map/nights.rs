@@ -38,17 +38,17 @@ impl SurfaceMaps {
         times_d: Option<&[f64]>,
     ) -> Result<Self, NoMaps> {
         let times_d = times_d.map(in_order).transpose()?;
-        let basis = Basis::new(&imager.grid);
+        let basis = Arc::new(Basis::seen(imager, &values));
         let fitted = fit(imager, &basis, values, known, None)?;
         if let Some(amplitude) = fitted.too_faint() {
             return Err(NoMaps::TooFaint(amplitude));
         }
-        let here = linearised((imager, &basis), fitted, nuisances).map_err(NoFit::from)?;
+        let here = linearised(imager, fitted, nuisances).map_err(NoFit::from)?;
         let fitted: &Fitted = here.kept();
         let marginal = &fitted.marginal;
         let settled = &marginal.settled;
-        let modelled = Modelled::of(imager, &basis, marginal, &settled.coefficients);
-        let of_static = of_static(imager, &basis, marginal);
+        let modelled = Modelled::of(imager, marginal, &settled.coefficients);
+        let of_static = of_static(imager, marginal);
         let times_d = times_d.unwrap_or_else(|| match is_static(marginal) {
             true => vec![mean(&observations.times_d())],
             false => nights(&observations.times_d()),
@@ -107,7 +107,7 @@ impl SurfaceMaps {
 /// The profiles as the most probable maps of a field explain them.
 pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &Fitted) -> Explained {
     let marginal = &fitted.marginal;
-    let modelled = Modelled::of(imager, &Basis::new(&imager.grid), marginal, &marginal.settled.coefficients);
+    let modelled = Modelled::of(imager, marginal, &marginal.settled.coefficients);
     let against = Against::new(imager, observations, marginal.values, &modelled.depths());
     let sets = imager.profiles_of_sets();
     let mut misfit = Checks::of_flexible(&against.residuals, &sets, imager.data.correlated_bins).warnings;
@@ -176,9 +176,9 @@ struct Modelled {
 
 impl Modelled {
     /// Of maps of these coefficients (H, profiles).
-    fn of(imager: &Imager, basis: &Basis, marginal: &Marginal, coefficients: &DMatrix<f64>) -> Self {
+    fn of(imager: &Imager, marginal: &Marginal, coefficients: &DMatrix<f64>) -> Self {
         let response = marginal.design.response();
-        let mut depth = response.depths_of_each(&marginal.design.brightness(basis, coefficients));
+        let mut depth = response.depths_of_each(&marginal.design.brightness(&marginal.basis, coefficients));
         let alike = marginal.design.mean_profile(imager, coefficients);
         if !alike.is_empty() {
             let columns = mean_profile::columns(imager);
@@ -186,7 +186,7 @@ impl Modelled {
             depth.iter_mut().zip(changes).for_each(|(depth, change)| *depth += change);
         }
         let shares = imager.jitter_share_of_each();
-        let slopes = marginal.slopes(imager, basis, &[]).into_iter().zip(&shares);
+        let slopes = marginal.slopes(imager, &[]).into_iter().zip(&shares);
         let slopes: Vec<f64> = slopes.flat_map(|(slopes, share)| (slopes * *share).as_slice().to_vec()).collect();
         let with_jitter = imager.clone().with_zero_points(marginal.assumed.jitter_kms, &slopes);
         let bins: Vec<_> = (0..response.profiles()).map(|k| response.bins(k)).collect();
@@ -231,15 +231,15 @@ impl Task for Weigh<'_> {
 }
 
 /// Model profiles of static spots.
-fn of_static(imager: &Imager, basis: &Basis, marginal: &Marginal) -> Option<Modelled> {
-    let Marginal { values, design, assumed, .. } = marginal;
+fn of_static(imager: &Imager, marginal: &Marginal) -> Option<Modelled> {
+    let Marginal { values, basis, design, assumed, .. } = marginal;
     if is_static(marginal) {
         return None;
     }
     let field = Field { kernel: Kernel::of(Lifetime::Static), ..assumed.field };
     let assumed = Assumed { field, ..*assumed };
     let still = Marginal::new(imager, basis, Arc::clone(design), *values, assumed, None).ok()?;
-    Some(Modelled::of(imager, basis, &still, &still.settled.coefficients))
+    Some(Modelled::of(imager, &still, &still.settled.coefficients))
 }
 
 /// The velocities of the profiles, marginalised over maps.

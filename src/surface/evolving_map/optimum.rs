@@ -111,8 +111,8 @@ type Start = (Vec<f64>, ParameterValues, Held);
 /// The highest of the maxima that the expansion around the star without a planet has, the field fitted anew there.
 fn without_search(sought: Sought, known: Known) -> Result<Start, SearchError> {
     let Sought { imager, space, other_starts, .. } = sought;
-    let basis = Basis::new(&imager.grid);
     let start = space.start();
+    let basis = Arc::new(Basis::seen(imager, &without_planet(space, &start)));
     let fitted = fit(imager, &basis, without_planet(space, &start), known, None)?;
     let (field, held) = (fitted.marginal.values, fitted.marginal.assumed.held());
     let first = MarginalPosterior::new(imager.clone(), space, field, held)?;

@@ -50,7 +50,7 @@ impl<'a> Planned<'a> {
 
     /// Coefficients (H, profiles) of unspotted stars: the mean of the field.
     pub fn mean_maps(&self) -> DMatrix<f64> {
-        DMatrix::zeros(self.basis.degrees.len(), self.imager.profiles().count())
+        DMatrix::zeros(self.basis.len(), self.imager.profiles().count())
     }
 
     /// Coefficients (H, profiles) of a map drawn for the time of each profile: the most probable ones where profiles

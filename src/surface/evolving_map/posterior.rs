@@ -5,6 +5,7 @@
 //! orbit is free ln Z is the quadratic of the reference. Where the field is free the maps are found anew, and the orbit
 //! is that of the quadratic around them. Where the star is free its profiles are made anew as well.
 
+use super::climb::{assumed_at, place};
 use super::{Assumed, Basis, Design, Held, Marginal};
 use crate::field::FieldError;
 use crate::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues};
@@ -13,10 +14,16 @@ use crate::star::Nearby;
 use crate::surface::expansion::{Expansion, STELLAR, free_stellar};
 use crate::surface::imaging::Imager;
 use crate::surface::static_map::is_physical;
+use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
 
 /// Name of ln Z beside a log-probability.
 pub const LN_EVIDENCE: &str = "ln_evidence";
+
+/// Step in ln amplitude, slope or ln lifetime by which the change of maps is found, and how far it is followed: maps of
+/// another field are found in a ninth less time from where it leads.
+const STEP: f64 = 0.2;
+const FAR: f64 = 0.6;
 
 /// Applications of the model that velocities and misfits of maps take.
 const SLOPES: u32 = 3;
@@ -26,8 +33,9 @@ const SLOPES: u32 = 3;
 pub struct MarginalPosterior {
     pub(super) imager: Imager,
     pub(super) space: ParameterSpace,
-    pub(super) basis: Arc<Basis>,
     pub(super) reference: Arc<Marginal>,
+    /// Change of its most probable maps with each number of the field; none where maps are not found anew.
+    along: Arc<Vec<(usize, DMatrix<f64>)>>,
     /// ln Z of the reference in the velocities of the profiles.
     velocities: Arc<Expansion>,
     anew: Anew,
@@ -59,21 +67,29 @@ impl MarginalPosterior {
         values: ParameterValues,
         held: Held,
     ) -> Result<Self, FieldError> {
-        let basis = Arc::new(Basis::exact(&imager.grid));
-        let design = Arc::new(Design::new(&imager, &basis, &values.state()));
-        let assumed = Assumed::of(&values, held);
-        let reference = Arc::new(Marginal::new(&imager, &basis, design, values, assumed, None)?);
-        let velocities = Arc::new(reference.expansion(&imager, &basis, &[])?);
         let is_free = |what: &dyn Fn(Parameter) -> bool| space.free().iter().any(|f| what(f.parameter));
         let anew = match () {
             _ if is_free(&|p| STELLAR.contains(&p)) => Anew::Star,
             _ if is_free(&Parameter::is_of_field) => Anew::Maps,
             _ => Anew::Nothing,
         };
-        let nearby = Arc::new(imager.nearby(&values.state()));
+        let (basis, state) = (Arc::new(Basis::seen(&imager, &values).exactly()), values.state());
+        let design = Design::new(&imager, &basis, &state);
+        let design = Arc::new(match anew {
+            Anew::Maps => design.moving(&imager, &basis, &state),
+            Anew::Nothing | Anew::Star => design,
+        });
+        let assumed = Assumed::of(&values, held);
+        let reference = Arc::new(Marginal::new(&imager, &basis, design, values, assumed, None)?);
+        let velocities = Arc::new(reference.expansion(&imager, &[])?);
+        let along = match anew {
+            Anew::Maps => along_the_field(&imager, &reference)?,
+            Anew::Nothing | Anew::Star => Vec::new(),
+        };
+        let nearby = Arc::new(imager.nearby(&state));
         let space = space.clone().with_field_of(&reference.values);
         let expansion = Arc::default();
-        Ok(MarginalPosterior { imager, space, basis, reference, velocities, anew, nearby, expansion })
+        Ok(MarginalPosterior { imager, space, reference, along: Arc::new(along), velocities, anew, nearby, expansion })
     }
 
     /// ln Z of the reference.
@@ -107,7 +123,8 @@ impl MarginalPosterior {
     /// # Errors
     /// [`FieldError`].
     pub(super) fn marginal_at(&self, values: ParameterValues, star: bool) -> Result<Marginal, FieldError> {
-        let MarginalPosterior { imager, basis, reference, nearby, .. } = self;
+        let MarginalPosterior { imager, reference, nearby, .. } = self;
+        let basis = &reference.basis;
         let design = match star {
             true => {
                 let state = values.state();
@@ -117,7 +134,12 @@ impl MarginalPosterior {
             false => Arc::clone(&reference.design),
         };
         let assumed = Assumed::of(&values, reference.assumed.held());
-        Marginal::new(imager, basis, design, values, assumed, Some(reference))
+        let off = place(&assumed) - place(&reference.assumed);
+        let mut maps = reference.settled.coefficients.clone();
+        for (i, along) in self.along.iter() {
+            maps += along * off[*i].clamp(-FAR, FAR);
+        }
+        Marginal::begun((imager, basis), design, values, assumed, Some((reference, maps)))
     }
 
     /// `values` with the orbit and systemic velocity of the reference.
@@ -132,13 +154,13 @@ impl MarginalPosterior {
         if !is_physical(&self.imager, &values, theta) {
             return Evaluation::rejected(Status::NonFinite);
         }
-        let harmonics = self.basis.degrees.len() as u32;
+        let harmonics = self.reference.basis.len() as u32;
         let (ln_evidence, model_applications) = match self.anew {
             Anew::Nothing => (Ok(self.velocities.log_likelihood_at(&values)), 0),
             Anew::Maps => (self.with_maps_anew(&values).map(|here| here.log_likelihood_at(&values)), SLOPES),
             Anew::Star => {
                 let here = self.marginal_at(values, true);
-                (here.and_then(|here| here.ln_evidence_of_sets(&self.imager, &self.basis)), harmonics)
+                (here.and_then(|here| here.ln_evidence_of_sets(&self.imager)), harmonics)
             }
         };
         match ln_evidence {
@@ -164,8 +186,23 @@ impl MarginalPosterior {
 
     fn with_maps_anew(&self, values: &ParameterValues) -> Result<Expansion, FieldError> {
         let here = self.marginal_at(self.at_reference_velocities(*values), false)?;
-        here.expansion(&self.imager, &self.basis, &[])
+        here.expansion(&self.imager, &[])
     }
+}
+
+/// Change of the most probable maps of `reference` with its ln amplitude, slope and ln lifetime, as far as it has them:
+/// those of other fields are found from where it leads to.
+fn along_the_field(imager: &Imager, reference: &Marginal) -> Result<Vec<(usize, DMatrix<f64>)>, FieldError> {
+    let here = place(&reference.assumed);
+    let along = |i: usize| {
+        let mut there = here;
+        there[i] += STEP;
+        let assumed = assumed_at(there, &reference.assumed);
+        let (design, values) = (Arc::clone(&reference.design), reference.values);
+        let there = Marginal::new(imager, &reference.basis, design, values, assumed, Some(reference))?;
+        Ok((i, (there.settled.coefficients - &reference.settled.coefficients) / STEP))
+    };
+    (0..3).filter(|i| here[*i].is_finite()).map(along).collect()
 }
 
 impl LogDensity for MarginalPosterior {

@@ -67,7 +67,7 @@ impl OtherRotation {
             values.set(Parameter::K, 0.0);
             values
         };
-        let (share, basis) = (share_of_many(imager), Basis::coarse(&imager.grid, DEGREE));
+        let (share, basis) = (share_of_many(imager), Arc::new(Basis::coarse(&imager.grid, DEGREE)));
         let fewer = share.as_ref().unwrap_or(imager);
         // ln Z with spots that live so many rotations
         let height = |period_d: f64, rotations: f64| {

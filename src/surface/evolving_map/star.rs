@@ -105,7 +105,7 @@ struct Top {
 #[derive(Clone)]
 struct Climb<'a> {
     imager: &'a Imager,
-    basis: Basis,
+    basis: Arc<Basis>,
     known: &'a Known,
     priors: &'a [StarPrior],
     free: Vec<bool>,
@@ -118,7 +118,7 @@ struct Climb<'a> {
 /// [`NoFit`].
 pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
     values.set(Parameter::K, 0.0);
-    fit(imager, &Basis::coarse(&imager.grid, DEGREE), values, known, None)
+    fit(imager, &Arc::new(Basis::coarse(&imager.grid, DEGREE)), values, known, None)
 }
 
 /// The slopes of drifts of the velocities (km/s per day) by the field `near`, beside no orbit, where one is steep.
@@ -129,8 +129,8 @@ pub fn slopes(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<
     if imager.drifts.is_empty() {
         return Ok(None);
     }
-    let (marginal, basis) = (&near.marginal, Basis::coarse(&imager.grid, DEGREE));
-    let held = marginal.known_zero_points(imager, &basis, &[])?.velocities(&[]);
+    let marginal = &near.marginal;
+    let held = marginal.known_zero_points(imager, &[])?.velocities(&[]);
     Ok(constants::slopes(&held, imager, nuisances, marginal.values[Parameter::Vsys]))
 }
 
@@ -224,7 +224,7 @@ impl<'a> Climb<'a> {
         let limits = limits_of_field(known).into_iter().chain([size]).chain(priors.iter().map(ends)).collect();
         // who trusts the line trusts the mean profile
         let free = known.free(assumed).into_iter().chain([priors.iter().any(StarPrior::is_of_line)]).collect();
-        Climb { imager, basis: Basis::coarse(&imager.grid, DEGREE), known, priors, free, limits }
+        Climb { imager, basis: Arc::new(Basis::coarse(&imager.grid, DEGREE)), known, priors, free, limits }
     }
 
     /// Where it begins.
@@ -323,7 +323,7 @@ impl<'a> Climb<'a> {
     fn bend(&self, at: &Point) -> Result<DMatrix<f64>, FieldError> {
         let parameters: Vec<Parameter> = self.priors.iter().map(|prior| prior.parameter).collect();
         let imager = &Imager { mean_profile: at.place[SIZE].exp(), ..self.imager.clone() };
-        let expansion = at.marginal.expansion(imager, &self.basis, &parameters)?;
+        let expansion = at.marginal.expansion(imager, &parameters)?;
         let profiles = expansion.profiles();
         let of_star = expansion.information.view((profiles, profiles), (parameters.len(), parameters.len()));
         let mut of_star = of_star.into_owned();

@@ -49,12 +49,16 @@ impl EvolvingMap {
 impl SurfaceModel for EvolvingMap {
     fn linearise(&self, at: At, near: Option<&Linearised>) -> Result<Linearised, SurfaceError> {
         let At { imager, values, nuisances } = at;
-        let basis = Basis::new(&imager.grid);
-        let mut fitted = fit(imager, &basis, values, self.known, near.map(|near| near.kept::<Fitted>()))?;
+        let near = near.map(|near| near.kept::<Fitted>());
+        let basis = match near {
+            Some(near) => Arc::clone(&near.marginal.basis),
+            None => Arc::new(Basis::seen(imager, &values)),
+        };
+        let mut fitted = fit(imager, &basis, values, self.known, near)?;
         if let Some(reached) = &self.at_bounds {
             fitted.at_bounds.clone_from(reached);
         }
-        Ok(linearised((imager, &basis), fitted, nuisances)?)
+        Ok(linearised(imager, fitted, nuisances)?)
     }
 
     fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
@@ -70,25 +74,23 @@ impl SurfaceModel for EvolvingMap {
         if found_kms <= 0.0 {
             return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0, scale_kms }));
         }
-        let basis = Basis::new(&at.imager.grid);
-        let marginal = fitted.marginal.without_jitter(at.imager, &basis)?;
-        let without = linearised((at.imager, &basis), Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
+        let marginal = fitted.marginal.without_jitter(at.imager)?;
+        let without = linearised(at.imager, Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
         let here = Linearised { field: here.field.clone(), ..without };
         Ok(Some(WithoutJitter { here, found_kms, scale_kms }))
     }
 
     fn absorbing(&self, at: At, here: &Linearised) -> Result<Vec<OfField>, SurfaceError> {
-        let basis = Basis::new(&at.imager.grid);
         let of_field = |marginal: &Marginal| {
             let marginal = match self.known.jitter_kms {
-                None if marginal.assumed.jitter_kms > 0.0 => marginal.without_jitter(at.imager, &basis)?,
+                None if marginal.assumed.jitter_kms > 0.0 => marginal.without_jitter(at.imager)?,
                 _ => marginal.clone(),
             };
             let ln_posterior = self.known.height(&marginal);
-            let here = linearised((at.imager, &basis), Fitted::near(marginal), at.nuisances)?;
+            let here = linearised(at.imager, Fitted::near(marginal), at.nuisances)?;
             Ok(OfField { velocities: here.quadratic, held: here.held, ln_posterior })
         };
-        here.kept::<Fitted>().absorbing((at.imager, &basis), &self.known, of_field)
+        here.kept::<Fitted>().absorbing(at.imager, &self.known, of_field)
     }
 
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel> {
@@ -113,9 +115,9 @@ impl SurfaceModel for EvolvingMap {
         groups: &[Vec<usize>],
         orbit: OrbitOf,
     ) -> Vec<Option<CircularOrbit>> {
-        let (marginal, basis) = (&here.kept::<Fitted>().marginal, Basis::new(&at.imager.grid));
+        let marginal = &here.kept::<Fitted>().marginal;
         let of_others = |others: &Expansion| orbit(&others.velocities(at.nuisances));
-        match marginal.without_each(at.imager, &basis, &here.expansion.stellar, groups, of_others) {
+        match marginal.without_each(at.imager, &here.expansion.stellar, groups, of_others) {
             Ok(all) => all.into_iter().map(|of| of.ok().flatten()).collect(),
             Err(_) => vec![None; groups.len()],
         }
