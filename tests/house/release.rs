@@ -59,6 +59,15 @@ fn the_crate_has_no_results() {
     }
 }
 
+/// The sources of the Python package have the manifest of the crate, and only the files that it packs: Cargo takes a
+/// target whose file is missing if its path is given, and refuses it otherwise.
+#[test]
+fn targets_have_paths() {
+    for section in read("Cargo.toml").split("\n[[").skip(1) {
+        assert!(section.contains("\npath = \""), "[[{}", section.lines().take(2).collect::<Vec<_>>().join(" "));
+    }
+}
+
 /// Two pages that whoever comes new reads before a change.
 #[test]
 fn contributing_is_short() {
