@@ -8,6 +8,7 @@ mod config;
 mod docs;
 mod examples;
 mod reference;
+mod release;
 mod schema;
 mod small;
 mod words;
