@@ -38,8 +38,7 @@ pub fn claim<E>(
     signals: &Signals,
     claim: impl Fn() -> Result<Claim, E>,
 ) -> Result<impl FnOnce() -> Result<Claim, E>, E> {
-    let early = if pool.is_of_ranks() { None } else { Some(claim()?) };
-    early.iter().for_each(|claim| signals.undo_by(claim.undo()));
+    let early = if pool.is_of_ranks() { None } else { Some(signals.undoing(&claim, Claim::undo)?) };
     Ok(move || early.map_or_else(claim, Ok))
 }
 

@@ -68,9 +68,19 @@ impl Signals {
         Ok(signals)
     }
 
-    /// What is to be done before a signal ends the program, until [`Signals::defer`].
-    pub fn undo_by(&self, undo: impl FnOnce() + Send + 'static) {
-        *self.undo.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(undo));
+    /// Makes what is to be undone before a signal ends the program, until [`Signals::defer`]; a signal meanwhile waits.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn undoing<T, E, U: FnOnce() + Send + 'static>(
+        &self,
+        make: impl FnOnce() -> Result<T, E>,
+        undo: impl FnOnce(&T) -> U,
+    ) -> Result<T, E> {
+        let mut held = self.undo.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = make()?;
+        *held = Some(Box::new(undo(&made)));
+        Ok(made)
     }
 
     /// From now on there is something to lose.

@@ -168,7 +168,7 @@ impl Claim {
     }
 
     /// What removes all trace of it, for whoever ends the program before it begins.
-    pub fn undo(&self) -> impl FnOnce() + Send + 'static {
+    pub fn undo(&self) -> impl FnOnce() + Send + use<> {
         let made = self.made.clone();
         move || made.remove()
     }
