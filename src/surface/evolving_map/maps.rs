@@ -46,9 +46,9 @@ impl Marginal {
     }
 
     /// At `values`, by a star `nearby` from maps of these coefficients (H, epochs), where the jitter is noise of the
-    /// profiles, along their slopes at the most probable maps. Maps that know nothing of it explain zero points by spots, so slopes and maps are found in turn,
-    /// so many times: slopes of other maps than these would seem to tell the velocities of the profiles from their
-    /// zero points.
+    /// profiles, along their slopes at the most probable maps. Maps that know nothing of it explain zero points by
+    /// spots, so slopes and maps are found in turn, so many times: slopes of other maps than these would seem to tell
+    /// the velocities of the profiles from their zero points.
     ///
     /// # Errors
     /// [`FieldError`].

@@ -4,7 +4,7 @@
 //! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
 //! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
 //! parameters, as an expansion like that of maximum entropy. The order:
-//! 1. [`Basis`]: the harmonics on the pixels of the map, once.
+//! 1. [`Basis`]: the harmonics on the pixels of the map, once; `seen`: those that the data see.
 //! 2. [`Design`]: the profiles of each harmonic, for one star, a model application a harmonic; and its light curves.
 //!    Both are epochs of the field, profiles first.
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
@@ -36,6 +36,7 @@ mod optimum;
 mod planned;
 mod posterior;
 mod rotation;
+mod seen;
 pub mod star;
 mod surface;
 
