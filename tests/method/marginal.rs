@@ -4,7 +4,7 @@ use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
-use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Design, Held, Marginal, MarginalPosterior, fit};
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Design, Held, Maps, Marginal, MarginalPosterior, fit};
 use dimcmc::internals::surface::{Change, Known};
 use dimcmc::{Config, Scene};
 use serde_json::json;
@@ -159,12 +159,12 @@ fn harmonics_that_no_data_see_change_nothing() {
     let all = Arc::new(Basis::new(&scene.imager.grid).exactly());
     let seen = Arc::new(Basis::seen(&scene.imager, &values).exactly());
     assert!(10 * seen.len() < 9 * all.len(), "{} of {}", seen.len(), all.len());
-    let ln_z = |basis: &Arc<Basis>, values: ParameterValues, [amplitude, slope, days]: [f64; 3]| {
+    let at = |basis: &Arc<Basis>, values: ParameterValues, [amplitude, slope, days]: [f64; 3]| {
         let design = Arc::new(Design::new(&scene.imager, basis, &values.state()));
         let spectrum = Spectrum { amplitude, slope, break_degree: 7.0 };
         let field = Field { spectrum, kernel: Kernel::of(Lifetime::Days(days)) };
         let assumed = Assumed { field, jitter_kms: 0.0 };
-        Marginal::new(&scene.imager, basis, design, values, assumed, None).unwrap().ln_evidence()
+        Marginal::new(&scene.imager, basis, design, values, assumed, None).unwrap()
     };
     let mut other = values;
     for (parameter, off) in [(Parameter::Inclination, 3.0), (Parameter::Vsini, 0.2)] {
@@ -172,10 +172,18 @@ fn harmonics_that_no_data_see_change_nothing() {
     }
     for values in [values, other] {
         for field in [[0.24, 0.53, 33.0], [0.3, 0.4, 20.0], [0.15, 1.5, 60.0]] {
-            let [all, seen] = [&all, &seen].map(|basis| ln_z(basis, values, field));
+            let [all, seen] = [&all, &seen].map(|basis| at(basis, values, field).ln_evidence());
             assert!((seen - all).abs() < 5e-3, "{field:?}: {seen}, with all {all}");
         }
     }
+    // maps and their errors, between the profiles and after them
+    let [all, seen] = [&all, &seen].map(|basis| {
+        let Marginal { settled, .. } = at(basis, values, [0.24, 0.53, 33.0]);
+        Maps::at(&settled, basis, &[5.3, 40.0])
+    });
+    let [filling, sd] = [(&all.filling - &seen.filling).amax(), (&all.sd - &seen.sd).amax()];
+    // a map has an error of some 0.1
+    assert!(filling < 5e-3 && sd < 1e-3, "{filling} {sd}");
 }
 
 /// The posterior of slow-planet with these parameters free, around its planet and the field of the reference.
