@@ -47,7 +47,7 @@ pub(super) fn rows_turned(matrix: &DMatrix<f64>, (first, rows): (usize, usize)) 
 }
 
 /// Columns whose numbers do not stand side by side.
-pub(super) type Turned<'a> = MatrixView<'a, f64, Dyn, Dyn, Dyn, Dyn>;
+type Turned<'a> = MatrixView<'a, f64, Dyn, Dyn, Dyn, Dyn>;
 
 /// First column and number of columns of every block.
 fn blocks(n: usize, block: usize) -> impl DoubleEndedIterator<Item = (usize, usize)> + ExactSizeIterator {

@@ -91,10 +91,7 @@ impl Design {
     pub(super) fn known_slopes(&self, state: &StarState, maps: &DMatrix<f64>) -> Option<Vec<DMatrix<f64>>> {
         let moving = self.moving.as_ref().filter(|moving| moving.state == *state)?;
         let slope = |k: usize| {
-            let coefficients = maps.column(k);
-            let q = 1.0 - self.response.contrast(k);
-            let continuum = self.mean_continuum[k] - q * self.continuum.column(k).dot(&coefficients);
-            let slope = (&moving.mean_line[k] - moving.line[k].tr_mul(&coefficients) * q) / continuum;
+            let (slope, _) = self.divided(k, (&moving.line[k], &moving.mean_line[k]), &maps.column(k).into_owned());
             DMatrix::from_column_slice(slope.len(), 1, slope.as_slice())
         };
         Some((0..self.response.profiles()).map(slope).collect())
@@ -138,9 +135,20 @@ impl Design {
 
     /// Model depths of profile `k` for a map of these coefficients, and its continuum.
     fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
+        self.divided(k, (&self.line[k], &self.mean_line[k]), coefficients)
+    }
+
+    /// The line of profile `k` for a map of these coefficients over its continuum, and that, given what each harmonic
+    /// makes of the line (H, numbers), and a star that is spotted alike all over.
+    fn divided(
+        &self,
+        k: usize,
+        (line, mean): (&DMatrix<f64>, &DVector<f64>),
+        coefficients: &DVector<f64>,
+    ) -> (DVector<f64>, f64) {
         let q = 1.0 - self.response.contrast(k);
         let continuum = self.mean_continuum[k] - q * self.continuum.column(k).dot(coefficients);
-        ((&self.mean_line[k] - self.line[k].tr_mul(coefficients) * q) / continuum, continuum)
+        ((mean - line.tr_mul(coefficients) * q) / continuum, continuum)
     }
 
     /// The profiles, then the bins of light curves, linearised around maps of these coefficients (H, epochs), without

@@ -101,12 +101,7 @@ pub fn fit(
     known: Known,
     near: Option<&Fitted>,
 ) -> Result<Fitted, NoFit> {
-    let state = values.state();
-    let design = Design::new(imager, basis, &state);
-    let design = Arc::new(match known.jitter_kms {
-        Some(0.0) => design,
-        _ => design.moving(imager, basis, &state),
-    });
+    let design = Arc::new(Design::new(imager, basis, &values.state()));
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
