@@ -67,8 +67,8 @@ impl Design {
         Design { response, condensed, line, continuum, mean_line, mean_continuum, light, moving: None }
     }
 
-    /// With how depths change with the velocities of the star at `state`, that of the design: two designs' work, which
-    /// some dozen maps make good.
+    /// With how depths change with the velocities of the star at `state`, that of the design. It is the work of two
+    /// designs, and a chain takes a tenth less; a fit with its few dozen maps takes as long as without.
     #[must_use]
     pub fn moving(mut self, imager: &Imager, basis: &Basis, state: &StarState) -> Self {
         let at = |h: f64| {
