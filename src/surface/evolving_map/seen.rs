@@ -2,8 +2,8 @@
 //!
 //! All harmonics of a degree have one prior variance, whatever directions they are counted along. So those directions
 //! of which the data see next to nothing can be left out, and tell nothing of the others. A star of 30 km/s with a line
-//! of 3.6 km/s leaves out four of ten, and evaluations with other spots take half of the time. The filter of many profiles
-//! (`field::filter`) goes on from these to directions over all degrees, which are others for each field.
+//! of 3.6 km/s leaves out four of ten, and evaluations with other spots take half of the time. The filter of many
+//! profiles (`field::filter`) goes on from these to directions over all degrees, which are others for each field.
 
 use super::condense::ROUGHEST;
 use super::{Basis, Design};
