@@ -14,10 +14,11 @@ use super::Kernel;
 use super::compress::with_directions;
 use super::dense::{self, Factor};
 use super::numbers::Numbers;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Largest variance, over that of the noise, of all numbers of all epochs together along directions that are left out.
@@ -73,12 +74,12 @@ impl Passage {
         Passage { value, rate, noise: [1.0 - dot(value, value), -dot(value, rate), 1.0 - dot(rate, rate)] }
     }
 
-    /// The columns of a rate and its value in the covariance (columns of `states` numbers), rows and then columns.
-    fn pair(&self, covariance: &mut [f64], [rate, value]: [usize; 2], states: usize) {
-        let (before, from_value) = covariance.split_at_mut(value * states);
-        let (of_rate, of_value) = (&mut before[rate * states..][..states], &mut from_value[..states]);
+    /// The columns of a rate and its value in the covariance, rows and then columns: of state number `rate`, among so
+    /// many rates.
+    fn pair(&self, [of_rate, of_value]: [&mut [f64]; 2], rate: usize, rates: usize) {
+        let value = rates + rate;
         for column in [&mut *of_rate, &mut *of_value] {
-            self.column(column, value - rate);
+            self.column(column, rates);
         }
         mix(of_rate, of_value, self.factors());
         let [own, across, of_rates] = self.noise;
@@ -146,33 +147,42 @@ impl Spread {
     fn go_on(&mut self, passage: Option<Passage>, seen: &DMatrix<f64>) -> DMatrix<f64> {
         let (states, rates) = (self.covariance.nrows(), self.rates);
         let (told, passage) = (self.told.take(), passage.filter(|_| rates > 0));
-        let mut along = DMatrix::zeros(states, seen.nrows());
-        let mut first = 0;
-        while first < states - rates {
-            let last = (first + COLUMNS).min(if first < rates { rates } else { states - rates });
-            // values with their rates, and then what has none
-            let values = rates + first..rates + last;
-            let pairs = if first < rates { first..last } else { 0..0 };
-            if let Some(told) = &told {
-                for columns in [values.clone(), pairs.clone()] {
-                    let own = told.rows_range(columns.clone()).transpose();
-                    self.covariance.columns_range_mut(columns).gemm(-1.0, told, &own, 1.0);
+        let (told, passage) = (told.as_ref(), passage.as_ref());
+        // columns of rates, of their values, and of what has no rate, a block of each at a time
+        let block = COLUMNS * states;
+        let (of_rates, of_values) = self.covariance.as_mut_slice().split_at_mut(rates * states);
+        let (of_values, alone) = of_values.split_at_mut(rates * states);
+        let pairs = of_rates.chunks_mut(block).zip(of_values.chunks_mut(block)).enumerate();
+        let pairs = pairs.map(|(k, (of_rates, of_values))| (k * COLUMNS, of_rates, of_values));
+        let alone = alone.chunks_mut(block).enumerate().map(|(k, columns)| (rates + k * COLUMNS, &mut [][..], columns));
+        let blocks: Vec<(usize, &mut [f64], &mut [f64])> = pairs.chain(alone).collect();
+        let parts = blocks.into_par_iter().map(|(first, of_rates, of_values)| {
+            let width = of_values.len() / states;
+            if let Some(told) = told {
+                for (first, columns) in [(rates + first, &mut *of_values), (first, &mut *of_rates)] {
+                    if !columns.is_empty() {
+                        let own = told.rows(first, width).transpose();
+                        DMatrixViewMut::from_slice(columns, states, width).gemm(-1.0, told, &own, 1.0);
+                    }
                 }
             }
-            if let Some(passage) = &passage {
-                let covariance = self.covariance.as_mut_slice();
-                for rate in pairs.clone() {
-                    passage.pair(covariance, [rate, rates + rate], states);
-                }
-                for column in values.clone().skip(pairs.len()) {
-                    passage.column(&mut covariance[column * states..][..states], rates);
+            if let Some(passage) = passage {
+                for (k, value) in of_values.chunks_mut(states).enumerate() {
+                    match of_rates.is_empty() {
+                        true => passage.column(value, rates),
+                        false => {
+                            let rate = &mut of_rates[k * states..][..states];
+                            passage.pair([rate, value], first + k, rates);
+                        }
+                    }
                 }
             }
-            let turned = seen.columns(first, last - first).transpose();
-            along.gemm(1.0, &self.covariance.columns_range(values), &turned, 1.0);
-            first = last;
-        }
-        along
+            let turned = seen.columns(first, width).transpose();
+            DMatrixView::from_slice(of_values, states, width) * turned
+        });
+        // in the order of the blocks, whoever made them
+        let parts: Vec<DMatrix<f64>> = parts.collect();
+        parts.iter().fold(DMatrix::zeros(states, seen.nrows()), |along, part| along + part)
     }
 }
 

@@ -5,14 +5,19 @@
 //! that knows nothing of the planet. That expansion is exact for small velocities only, so the best orbit is found
 //! again in an expansion around the image that it implies, and so on until K stays. A second planet is searched for in
 //! the last expansion, where the first is small.
+//!
+//! Planets of known ephemeris belong to the star: all is searched beside them, their K left free. Where the first planet
+//! of a config is one of them, the best orbit is its own.
 
+mod known;
 mod remarks;
 mod robustness;
 
+pub use known::{Known, KnownPlanet};
 pub use remarks::Evidence;
-pub use robustness::{HeldOut, Robustness, WithoutNight, robustness};
+pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, robustness};
 
-use crate::model::{Parameter, ParameterValues};
+use crate::model::{Ephemeris, Parameter, ParameterValues};
 use crate::planets::periodogram::eccentric::keplerian;
 use crate::planets::periodogram::offset::{Offset, offset};
 use crate::planets::periodogram::orbits;
@@ -47,6 +52,8 @@ pub struct DetectionSettings {
     pub surface: SurfaceSettings,
     /// Parameters that are integrated out within their priors; the others are fixed.
     pub nuisances: Vec<Nuisance>,
+    /// Planets whose periods and conjunctions are known.
+    pub known: Vec<Ephemeris>,
     /// How peaks are judged.
     pub search: SearchSettings,
     /// Whether eccentric orbits are fitted.
@@ -63,6 +70,7 @@ impl DetectionSettings {
         DetectionSettings {
             surface,
             nuisances,
+            known: Vec::new(),
             search: SearchSettings::default(),
             eccentric: false,
             second_planet: false,
@@ -89,7 +97,11 @@ pub struct Detection {
     pub change: Option<Result<Change, NoFit>>,
     /// Another rotation period with which the profiles are far more probable.
     pub other_rotation: Option<OtherRotation>,
-    /// Without a planet.
+    /// Planets of known ephemeris.
+    pub known: Known,
+    /// The likelihood of the velocities of the star without these; `None` where there are none.
+    alone: Option<Jitters>,
+    /// Without a planet but those.
     pub planet_free: Linearised,
     /// The same without its jitter, where the profiles say how large that is: what `blind` is of.
     pub without_jitter: Option<WithoutJitter>,
@@ -119,6 +131,8 @@ pub struct Detection {
 pub enum Stage {
     /// The planet-free image and its expansion.
     PlanetFree,
+    /// The same with the planets of known ephemeris.
+    Known,
     /// Whether the star changes.
     Change,
     /// Periods, draws.
@@ -143,6 +157,10 @@ fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
 /// A star without a planet, and the blind search for one there.
 #[derive(Clone, Debug)]
 pub struct PlanetFree {
+    /// Planets of known ephemeris, which it has.
+    pub known: Known,
+    /// The likelihood of the velocities of the star without these; `None` where there are none.
+    pub alone: Option<Jitters>,
     /// The star.
     pub here: Linearised,
     /// The same without its jitter, where the profiles say how large that is.
@@ -160,13 +178,23 @@ impl PlanetFree {
         surface: &dyn SurfaceModel,
         mut at: At,
         frequencies: &Frequencies,
-        settings: SearchSettings,
+        settings: &DetectionSettings,
         report: &dyn Fn(Stage),
     ) -> Result<Self, SurfaceError> {
         report(Stage::PlanetFree);
         at.values.set(Parameter::K, 0.0);
-        let here = surface.linearise(at, None)?;
-        PlanetFree::of(surface, at, here, frequencies, settings, report)
+        let mut here = surface.linearise(at, None)?;
+        if settings.known.is_empty() {
+            return PlanetFree::of(surface, at, here, frequencies, settings.search, report);
+        }
+        report(Stage::Known);
+        let alone = jitters(&here, surface.without_jitter(at, &here)?.as_ref());
+        let known = Known::absent(&settings.known, &here.quadratic);
+        known.write(&mut at.values);
+        here = surface.linearise(at, Some(&here))?;
+        let known = known.present(&here.quadratic);
+        let found = PlanetFree::beside(known, surface, at, here, frequencies, settings.search, report)?;
+        Ok(PlanetFree { alone: Some(alone), ..found })
     }
 
     /// Of the star in `at`, without an orbit, that is linearised `here`.
@@ -181,17 +209,38 @@ impl PlanetFree {
         settings: SearchSettings,
         report: &dyn Fn(Stage),
     ) -> Result<Self, SurfaceError> {
+        PlanetFree::beside(Known::default(), surface, at, here, frequencies, settings, report)
+    }
+
+    /// The same, the star having `known` planets.
+    fn beside(
+        known: Known,
+        surface: &dyn SurfaceModel,
+        at: At,
+        here: Linearised,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+        report: &dyn Fn(Stage),
+    ) -> Result<Self, SurfaceError> {
         report(Stage::Search);
         let without_jitter = surface.without_jitter(at, &here)?;
-        let jitters = jitters(&here, without_jitter.as_ref());
+        let jitters = jitters_beside(&known, &here, without_jitter.as_ref());
         let blind = imitated(surface, Search::with_jitter(&jitters, frequencies, settings)?);
-        Ok(PlanetFree { here, without_jitter, blind })
+        Ok(PlanetFree { known, alone: None, here, without_jitter, blind })
     }
 }
 
 /// The likelihood of the velocities of the star `here`, beside the jitter if the profiles say how large it is.
 pub fn jitters(here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
     without_jitter.map_or_else(|| Jitters::none(&here.quadratic), WithoutJitter::jitters)
+}
+
+/// The same with the orbits of `known` planets left free.
+pub fn jitters_beside(known: &Known, here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
+    match without_jitter {
+        Some(without) => without.beside(&known.beside(&without.here.quadratic)),
+        None => Jitters::none(&known.beside(&here.quadratic)),
+    }
 }
 
 impl Detection {
@@ -207,18 +256,23 @@ impl Detection {
         report: &dyn Fn(Stage),
     ) -> Result<Self, SurfaceError> {
         let surface = settings.surface.model();
-        let at = At { imager, values, nuisances: &settings.nuisances };
-        let PlanetFree { here: planet_free, without_jitter, blind } =
-            PlanetFree::find(&*surface, at, &frequencies, settings.search, report)?;
+        let mut at = At { imager, values, nuisances: &settings.nuisances };
+        let PlanetFree { known, alone, here: planet_free, without_jitter, blind } =
+            PlanetFree::find(&*surface, at, &frequencies, settings, report)?;
+        if !known.planets.is_empty() {
+            known.write(&mut at.values);
+        }
         let best = match without_jitter.as_ref().is_some_and(|without| without.found_kms > 0.0) {
             false => blind.best().orbit.delta_ln_l,
-            true => highest(&planet_free.quadratic, &frequencies),
+            true => highest(&known.beside(&planet_free.quadratic), &frequencies),
         };
-        let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
+        let offset = offset(&known.beside(&planet_free.quadratic), &frequencies.per_cycle, best);
         report(Stage::Change);
         let change = surface.evolution(at, &frequencies);
         let mut found = Detection {
             best: *blind.best(),
+            known,
+            alone,
             planet_free,
             without_jitter,
             blind,
@@ -233,7 +287,11 @@ impl Detection {
             offset,
             co_rotation_penalty: None,
         };
-        found.close(&*surface, at, report)?;
+        match found.known.first().map(KnownPlanet::peak) {
+            // the star without another planet is imaged with its orbit
+            Some(peak) => (found.best, found.closed) = (peak, true),
+            None => found.close(&*surface, at, report)?,
+        }
         found.co_rotation_penalty = co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
@@ -245,9 +303,9 @@ impl Detection {
         Ok(found)
     }
 
-    /// The likelihood that the blind search is of.
+    /// The likelihood of the velocities of the star without a planet, known ones included.
     pub fn jitters(&self) -> Jitters {
-        jitters(&self.planet_free, self.without_jitter.as_ref())
+        self.alone.clone().unwrap_or_else(|| jitters(&self.planet_free, self.without_jitter.as_ref()))
     }
 
     /// The last expansion.
@@ -255,18 +313,35 @@ impl Detection {
         self.at_best.as_ref().unwrap_or(&self.planet_free)
     }
 
-    /// The velocities that profiles have in common, beside the best orbit; `None` where they are not bounded.
+    /// The velocities that profiles have in common, beside the best orbit and those of known planets; `None` where they
+    /// are not bounded.
     pub fn constants(&self, imager: &Imager, nuisances: &[Nuisance]) -> Option<Constants> {
-        self.last().constants(imager, nuisances, Some(&self.best))
+        let here = self.last();
+        let best = Some(&self.best).filter(|_| self.known.first().is_none());
+        here.constants(imager, nuisances, (best, self.known.columns(&here.held.cycles).as_ref()))
+    }
+
+    /// The highest peak of the blind search: the best orbit, unless that is one of a known planet.
+    pub fn highest(&self) -> &Peak {
+        if self.known.first().is_some() { self.blind.best() } else { &self.best }
+    }
+
+    /// Velocities (km/s) of the best orbit.
+    fn best_velocities(&self, cycles: &[f64]) -> DVector<f64> {
+        let CircularOrbit { k_kms, phi, .. } = self.best.orbit;
+        match self.known.first() {
+            Some(planet) => k_kms * planet.unit_velocities(cycles),
+            None => {
+                let orbit = Orbit { k_kms, porb_over_prot: self.best.porb_over_prot, phi };
+                DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles))
+            }
+        }
     }
 
     /// Delta ln L of the best orbit in the regularised likelihood.
     pub fn regularised_delta_ln_l(&self) -> f64 {
-        let CircularOrbit { k_kms, phi, .. } = self.best.orbit;
-        let orbit = Orbit { k_kms, porb_over_prot: self.best.porb_over_prot, phi };
         let regularised = &self.last().regularised;
-        let velocities = DVector::from_iterator(regularised.len(), orbit.velocities_kms(&regularised.cycles));
-        regularised.log_likelihood(&velocities)
+        regularised.log_likelihood(&self.best_velocities(&regularised.cycles))
     }
 
     /// What is to be said where the star changes and is taken for one that does not.
@@ -307,7 +382,7 @@ impl Detection {
                 at.values.set(Parameter::Vsys, vsys.value_kms);
             }
             let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
-            let mut next = refined(&here.quadratic, &self.frequencies, &self.best);
+            let mut next = refined(&self.known.beside(&here.quadratic), &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
@@ -324,8 +399,8 @@ impl Detection {
     /// The Keplerian orbits of all peaks.
     fn eccentric(&self) -> Vec<Option<KeplerianOrbit>> {
         let others = self.blind.peaks[1..].iter().map(|peak| (&self.planet_free, peak));
-        let all = std::iter::once((self.last(), &self.best)).chain(others);
-        all.map(|(there, peak)| keplerian(&there.quadratic, &self.frequencies, peak)).collect()
+        let all = std::iter::once((self.last(), self.highest())).chain(others);
+        all.map(|(there, peak)| keplerian(&self.known.beside(&there.quadratic), &self.frequencies, peak)).collect()
     }
 
     /// A search with the best orbit taken out; `None` where that leaves nothing.
@@ -334,7 +409,7 @@ impl Detection {
         surface: &dyn SurfaceModel,
         settings: SearchSettings,
     ) -> Result<Option<SecondPlanet>, Unbounded> {
-        let quadratic = &self.last().quadratic;
+        let quadratic = &*self.known.beside(&self.last().quadratic);
         let Some(rest) = without(quadratic, 1.0 / self.best.porb_over_prot) else { return Ok(None) };
         let search = imitated(surface, Search::new(&rest, &self.frequencies, settings)?);
         let both = both(quadratic, &self.frequencies, &self.best, search.best());

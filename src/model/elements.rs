@@ -8,6 +8,7 @@ use super::parameters::{PARAMETERS, Parameter, Role};
 use super::prior::Prior;
 use super::values::{Element, ParameterValues};
 use crate::star::{Eccentric, Shape};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
 /// The parameters of one planet.
@@ -30,7 +31,7 @@ pub struct Elements {
 }
 
 /// What days are counted with.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Rotation period (d).
     pub rotation_period_d: f64,

@@ -7,6 +7,7 @@
 mod access;
 pub mod coordinates;
 pub mod elements;
+mod ephemeris;
 pub mod orbital;
 pub mod parameters;
 pub mod prior;
@@ -16,6 +17,7 @@ pub mod values;
 
 pub use coordinates::{FreeParameter, ParameterSpace, for_blind_search, period_prior};
 pub use elements::{Clock, Elements};
+pub use ephemeris::Ephemeris;
 pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{PARAMETERS, Parameter, Spec, Step, turning};
 pub use prior::{Prior, PriorKind};

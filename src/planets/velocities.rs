@@ -38,6 +38,26 @@ impl VelocityQuadratic {
         self.gradient.dot(v) - 0.5 * v.dot(&(&self.information * v))
     }
 
+    /// The same with the amplitudes of the columns of `x` (profiles x amplitudes) left free: gradient `Q g`, information
+    /// `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). `None` where they are not bounded.
+    pub fn beside(&self, x: &DMatrix<f64>) -> Option<Self> {
+        let ix = &self.information * x;
+        let answer = x.tr_mul(&ix).cholesky()?.solve(&x.transpose());
+        let keep = DMatrix::identity(self.len(), self.len()) - &ix * answer;
+        let information = &keep * &self.information;
+        Some(VelocityQuadratic {
+            cycles: self.cycles.clone(),
+            gradient: &keep * &self.gradient,
+            information: 0.5 * (&information + information.transpose()),
+        })
+    }
+
+    /// The most likely amplitude of the velocities `unit` and its standard error.
+    pub fn amplitude(&self, unit: &DVector<f64>) -> [f64; 2] {
+        let information = unit.dot(&(&self.information * unit));
+        [self.gradient.dot(unit) / information, information.sqrt().recip()]
+    }
+
     /// The most likely velocities (km/s), and their covariance (km^2/s^2), the inverse of the information.
     ///
     /// # Errors

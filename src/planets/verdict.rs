@@ -138,6 +138,9 @@ pub struct Known {
     pub significance: f64,
     /// 95 % upper limit on K (km/s), for K of 0 or more.
     pub k_upper95_kms: f64,
+    /// Number of the planet (from 1), where several are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planet: Option<usize>,
 }
 
 /// Why a planet of known ephemeris is not judged.
@@ -149,14 +152,20 @@ pub fn one_sided(z: f64) -> f64 {
 }
 
 impl Verdict {
-    /// Of a planet of known ephemeris: `alone` is K with its error where there is no planet in the model, `signal`
+    /// Of a planet of known ephemeris, with its number (from 1) where there are several: `alone` is K with its error where there is no planet in the model, `signal`
     /// where there is, and its 95 % upper limit. The false-alarm probability is that of one period, one-sided.
-    pub fn of_known(alone: [f64; 2], signal: Signal, k_upper95_kms: f64, remarks: &[Remark]) -> Self {
+    pub fn of_known(
+        planet: Option<usize>,
+        alone: [f64; 2],
+        signal: Signal,
+        k_upper95_kms: f64,
+        remarks: &[Remark],
+    ) -> Self {
         let significance = alone[0] / alone[1];
         if !significance.is_finite() {
             return Verdict::not_judged(UNBOUNDED);
         }
-        Verdict::judged(one_sided(significance), signal, remarks, Some(Known { significance, k_upper95_kms }))
+        Verdict::judged(one_sided(significance), signal, remarks, Some(Known { significance, k_upper95_kms, planet }))
     }
 
     /// Of a signal with that false-alarm probability.
@@ -235,7 +244,8 @@ impl Verdict {
 }
 
 fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Known, against: &[String]) -> String {
-    let Known { significance, k_upper95_kms } = *known;
+    let Known { significance, k_upper95_kms, planet } = *known;
+    let planet = planet.map_or_else(String::new, |number| format!(" {number}"));
     let head = match finding {
         Finding::NoPlanetNeeded => "not detected",
         Finding::Candidate if against.is_empty() => "marginal (FAP < 1 %)",
@@ -244,7 +254,7 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
         Finding::NotJudged => return String::new(),
     };
     format!(
-        "Known planet: {head}. {}; K > 0 at {significance:.1}σ (one-sided p = {}); K < {} (95 % upper limit).{}",
+        "Known planet{planet}: {head}. {}; K > 0 at {significance:.1}σ (one-sided p = {}); K < {} (95 % upper limit).{}",
         signal.words(),
         probability(chance),
         speed(k_upper95_kms, signal.sigma_k_kms),
@@ -337,14 +347,14 @@ mod tests {
     #[test]
     fn a_known_planet_is_judged_by_its_own_period() {
         assert!((one_sided(1.6449) - 0.05).abs() < 1e-5);
-        let verdict = Verdict::of_known([0.1, 0.01], SIGNAL, 0.12, &[]);
+        let verdict = Verdict::of_known(None, [0.1, 0.01], SIGNAL, 0.12, &[]);
         assert_eq!(verdict.finding, Finding::Detection);
         assert!(verdict.sentence.contains("K > 0 at 10.0σ"), "{}", verdict.sentence);
         let less = verdict.with(&[Remark::against("driven by a single night", "")]);
         assert_eq!(less.finding, Finding::Candidate);
         assert!(less.sentence.ends_with("Caveats: driven by a single night."), "{}", less.sentence);
-        assert_eq!(Verdict::of_known([0.01, 0.01], SIGNAL, 0.12, &[]).finding, Finding::NoPlanetNeeded);
-        assert_eq!(Verdict::of_known([0.0, 0.0], SIGNAL, 0.12, &[]).finding, Finding::NotJudged);
+        assert_eq!(Verdict::of_known(None, [0.01, 0.01], SIGNAL, 0.12, &[]).finding, Finding::NoPlanetNeeded);
+        assert_eq!(Verdict::of_known(None, [0.0, 0.0], SIGNAL, 0.12, &[]).finding, Finding::NotJudged);
     }
 
     #[test]

@@ -159,7 +159,7 @@ impl FreeVelocities {
         let nuisances = nuisances(&scene.settings.free);
         let orbit = FreeVelocities::orbit(scene, here, &nuisances);
         let significant = orbit.as_ref().filter(|(_, probability)| *probability < CANDIDATE_FAP);
-        let constants = here.constants(&scene.imager, &nuisances, significant.map(|(peak, _)| peak));
+        let constants = here.constants(&scene.imager, &nuisances, (significant.map(|(peak, _)| peak), None));
         Some(FreeVelocities { orbit, offsets: constants.map_or_else(Vec::new, |constants| constants.offsets) })
     }
 

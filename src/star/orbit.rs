@@ -34,7 +34,7 @@ impl Orbit {
 
 /// Eccentricity e and argument of periastron omega of the star's orbit, as `sqrt(e) cos(omega)` and
 /// `sqrt(e) sin(omega)`. A circle is zero twice.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shape {
     /// `sqrt(e) cos(omega)`.
     pub sqrt_e_cos_omega: f64,

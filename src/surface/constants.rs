@@ -8,7 +8,7 @@ use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::{Common, common_velocities};
 use crate::planets::velocities::VelocityQuadratic;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// A velocity with its standard error.
@@ -112,13 +112,20 @@ pub struct Constants {
 
 impl Linearised {
     /// The velocities that profiles of `imager` have in common, beside the orbit of the `peak`, with its amplitude,
-    /// phase and period free, or beside no orbit. The systemic velocity is free if it is among the `nuisances`. `None`
+    /// phase and period free, or beside none; and beside the amplitudes of other velocities, the columns of `known`
+    /// (profiles x amplitudes). The systemic velocity is free if it is among the `nuisances`. `None`
     /// where they are not bounded.
-    pub fn constants(&self, imager: &Imager, nuisances: &[Nuisance], peak: Option<&Peak>) -> Option<Constants> {
+    pub fn constants(
+        &self,
+        imager: &Imager,
+        nuisances: &[Nuisance],
+        (peak, known): (Option<&Peak>, Option<&DMatrix<f64>>),
+    ) -> Option<Constants> {
         let n = self.held.len();
         let vsys_kms = self.expansion.values[Parameter::Vsys];
         let (is_free, all) = commons(imager, nuisances, vsys_kms, n);
-        let (values, sigmas) = common_velocities(&self.held, &all, peak)?;
+        let rest = known.and_then(|known| self.held.beside(known));
+        let (values, sigmas) = common_velocities(rest.as_ref().unwrap_or(&self.held), &all, peak)?;
         // from where the expansion holds them
         let centres = is_free.then_some(vsys_kms).into_iter().chain(imager.zero_points.iter().map(|z| z.held_kms()));
         let found = centres.zip(values.iter().zip(&sigmas));

@@ -13,7 +13,7 @@ pub use strength::star_for;
 
 use crate::data::config::{Automatic, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter};
 use crate::data::dataset::{Dataset, ProfileSet, SceneError};
-use crate::data::ephemeris::Ephemeris;
+use crate::data::ephemeris;
 use crate::data::io::lsd::{self, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet};
 use crate::star::observation::Observations;
@@ -64,7 +64,7 @@ impl Calibrated {
             [one] => one.clone(),
             several => format!("{:x}", Sha256::digest(several.concat())),
         };
-        Ephemeris::check(settings, &parts)?;
+        ephemeris::check(settings, &parts)?;
         let mut imager = imager(settings, &settings.sets, &parts, &seasons)?;
         imager.light_curves = light_curves::near(settings, &parts, &light_curves)?;
         imager.data.correlated_bins = correlated_bins(&parts, &errors);

@@ -12,7 +12,7 @@ use crate::figures::drawing::colour::{BLACK, BLUE, GREY, PURPLE, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
 use crate::planets::verdict::speed;
-use crate::runs::blind_search::{OrbitRecord, PeriodogramFile};
+use crate::runs::blind_search::{KnownPlanetRecord, OrbitRecord, PeriodogramFile};
 use crate::runs::origin;
 use crate::star::{Eccentric, Motion, Orbit};
 use std::path::Path;
@@ -109,7 +109,12 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
 /// The velocities of a blind search, with the orbit that it found.
 pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure, PlotError> {
     let OrbitRecord { k_kms, sigma_k_kms, porb_over_prot, sigma_porb_over_prot, phi, period_d, .. } = file.best;
-    let motion = Motion::from(Orbit { k_kms, porb_over_prot, phi });
+    // planets of known ephemeris, or the best orbit
+    let mut known = file.known_planets.iter().filter(|_| file.blind.is_some()).map(KnownPlanetRecord::eccentric);
+    let motion = match known.next() {
+        Some(first) => Motion { first, second: known.next() },
+        None => Motion::from(Orbit { k_kms, porb_over_prot, phi }),
+    };
     // velocities count from a systemic velocity that is found
     let offset_kms = match file.systemic_velocity {
         Some(_) => 0.0,
@@ -142,15 +147,21 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
         vsys_kms: offset_kms,
         rotation_period_d: period_d / porb_over_prot,
         sigma: [Some(sigma_k_kms), sigma_porb_over_prot],
-        orbit_is: "best orbit",
+        orbit_is: if file.blind.is_some() { "known planet" } else { "best orbit" },
         events: events(&file.provenance, cycle.len()),
     };
     let mut figure = curves.draw();
     figure.caption = format!(
-        "Radial velocities. Top: first moments of the profiles. Middle: spots marginalised out, and the best orbit; \
+        "Radial velocities. Top: first moments of the profiles. Middle: spots marginalised out, and the {}; \
         uncertainties are correlated, bars are the diagonal of the covariance (covariance.csv), without the \
         uncertainty of systemic velocity and RV offsets, which shifts all profiles of a data set alike. Bottom: \
-        residuals. Right: the same folded with the orbital period; phase 0 is the largest velocity.{}",
+        residuals. Right: the same folded with the orbital period{}; phase 0 is the largest velocity.{}",
+        match file.known_planets.len() {
+            _ if file.blind.is_none() => "best orbit",
+            1 => "orbit of the known planet",
+            _ => "orbits of the known planets",
+        },
+        if motion.second.is_some() { " of the first planet, the second taken out" } else { "" },
         curves.of_events(),
     );
     Ok(figure)

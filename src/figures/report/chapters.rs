@@ -98,15 +98,16 @@ fn search(file: &PeriodogramFile) -> Chapter {
             peak.rotation.clone().unwrap_or_else(|| NOTHING.into()),
         ]
     };
+    let beside = file.known_planets.iter().skip(usize::from(file.blind.is_some())).map(|planet| &planet.verdict);
     let k = format!("*K* ({})", unit.name);
     let head = ["period (d)", &k, "*σ*_{K}", "Δ ln *L*", "FAP", "alias", "rotation"];
     Chapter {
         heading: "Search for a planet".into(),
-        verdicts: vec![verdicts::of(&file.verdict)],
+        verdicts: std::iter::once(&file.verdict).chain(beside).chain(&file.blind).map(verdicts::of).collect(),
         warnings: file.warnings.clone(),
         notes,
         tables: vec![
-            ("The best orbit.".into(), table(&["parameter", "best", "uncertainty", "injected"], orbit)),
+            (if file.blind.is_some() { "The known planet." } else { "The best orbit." }.into(), table(&["parameter", "best", "uncertainty", "injected"], orbit)),
             ("Peaks of the periodogram.".into(), table(&head, file.peaks.iter().map(peak).collect())),
         ],
         diagnostics: Vec::new(),

@@ -15,6 +15,9 @@ const FEW: usize = 12;
 /// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
 const OFFSET_GAIN: f64 = 12.5;
 
+/// Delta ln L of a known planet whose false-alarm probability is 1 %: 2.33 standard errors, one-sided.
+const KNOWN_LEVEL: f64 = 2.706;
+
 /// Other peaks that may be the true one, as many as are named.
 const RIVALS_NAMED: usize = 3;
 
@@ -32,9 +35,9 @@ pub struct Evidence<'a> {
 }
 
 impl Detection {
-    /// The verdict on the best orbit, given the [`Detection::remarks`].
+    /// The verdict on the highest peak, given the [`Detection::remarks`].
     pub fn verdict(&self, remarks: &[Remark]) -> Verdict {
-        let signal = self.best.signal(self.frequencies.rotation_period_d);
+        let signal = self.highest().signal(self.frequencies.rotation_period_d);
         match self.not_judged() {
             Some(sentence) => Verdict::not_judged(sentence),
             None => Verdict::new(self.false_alarm_probability(), signal, remarks).with_periods(self.shares(&|_| true)),
@@ -56,6 +59,11 @@ impl Detection {
 
     /// All that has to be said, what speaks against a planet with the rest.
     pub fn remarks(&self, evidence: &Evidence) -> Vec<Remark> {
+        [self.of_the_star(evidence), self.of_the_best_orbit(evidence), self.of_the_search()].concat()
+    }
+
+    /// What is to be said of the star, whatever its planets.
+    pub fn of_the_star(&self, evidence: &Evidence) -> Vec<Remark> {
         let mut remarks = evidence.settings.surface.model().remarks(evidence.imager, self.last());
         let misfit = |text: &String| Remark::against("residuals inconsistent with noise", text);
         remarks.extend(evidence.misfit.iter().map(misfit));
@@ -63,10 +71,23 @@ impl Detection {
         remarks.extend(self.of_the_change());
         let near = self.other_rotation.as_ref().filter(|other| !other.is_far());
         remarks.extend(near.map(|other| Remark::note(other.sentence())));
-        if self.is_candidate() {
-            remarks.extend(self.of_the_period());
+        remarks
+    }
+
+    /// What is to be said of the highest peak: its period, and whether it depends on a choice that was tried.
+    pub fn of_the_peak(&self, robustness: Option<&Robustness>) -> Vec<Remark> {
+        let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
+        let level = self.blind.false_alarm.level(CANDIDATE_FAP);
+        remarks.extend(self.of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
+        remarks
+    }
+
+    /// What is to be said of the best orbit.
+    fn of_the_best_orbit(&self, evidence: &Evidence) -> Vec<Remark> {
+        if let Some(planet) = self.known.first() {
+            return self.of_choices(evidence.robustness, planet.orbit().delta_ln_l, KNOWN_LEVEL);
         }
-        remarks.extend(self.of_choices(evidence.robustness));
+        let mut remarks = self.of_the_peak(evidence.robustness);
         if self.best.on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",
@@ -79,6 +100,12 @@ impl Detection {
                 format!("K has not converged after {rounds} re-linearisations."),
             ));
         }
+        remarks
+    }
+
+    /// What else has to be known of the search.
+    fn of_the_search(&self) -> Vec<Remark> {
+        let mut remarks = Vec::new();
         let shortest = self.frequencies.rotation_period_d / self.frequencies.range().1;
         if shortest > self.frequencies.rotation_period_d {
             remarks.push(Remark::note(format!(
@@ -144,7 +171,7 @@ impl Detection {
     /// Whether the best period is the one of the planet.
     pub fn of_the_period(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
-        if let Some(imitation) = self.best.imitation {
+        if let Some(imitation) = self.highest().imitation {
             let words = imitation.words(self.frequencies.rotation_period_d);
             let what = match imitation.alias {
                 None => format!("The best period is consistent with {}", imitation.period()),
@@ -204,8 +231,8 @@ impl Detection {
         format!("P = {period_d:.digits$} d{alias} has {percent:.0} % of the posterior (Δln L = -{below:.1})")
     }
 
-    /// Whether the result depends on a choice.
-    fn of_choices(&self, robustness: Option<&Robustness>) -> Vec<Remark> {
+    /// Whether an orbit of that `height` depends on a choice; a candidate's is `level` at least.
+    fn of_choices(&self, robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<Remark> {
         let Some(robustness) = robustness else { return Vec::new() };
         let mut remarks = Vec::new();
         if let Some(errors) = robustness.target_matters() {
@@ -214,7 +241,7 @@ impl Detection {
                 format!("K shifts by {errors:.1}σ when imaging.chi2_target changes by 3 %: quote the range."),
             ));
         }
-        if let Some(held) = robustness.held_out().filter(|held| self.is_candidate() && held.delta_ln_p < 0.0) {
+        if let Some(held) = robustness.held_out().filter(|held| height > level && held.delta_ln_p < 0.0) {
             remarks.push(Remark::against(
                 "held-out nights not predicted better",
                 format!(
@@ -223,7 +250,6 @@ impl Detection {
                 ),
             ));
         }
-        let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         for night in robustness.decisive_nights(level) {
             remarks.push(Remark::against(
                 "driven by a single night",

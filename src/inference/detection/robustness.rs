@@ -4,9 +4,9 @@
 //! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
 //! target, or of the profiles that remain. Where maps are integrated over, profiles are taken out of the evidence.
 
-use super::{Detection, DetectionSettings};
+use super::{Detection, DetectionSettings, KnownPlanet};
 use crate::model::{Parameter, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, orbits};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Peak, orbits};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::star::observation::{NIGHT_GAP_D, nights};
@@ -60,20 +60,62 @@ pub struct Robustness {
     pub nights: Vec<WithoutNight>,
 }
 
-/// Tries the best orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets,
-/// and without a night the field, and the maps around which profiles are linear, are those found last.
+/// The orbit that is tried out.
+#[derive(Clone, Copy, Debug)]
+pub enum Tried<'a> {
+    /// A peak of the search: its period is kept.
+    Peak(&'a Peak),
+    /// That of a known planet: all but K is kept.
+    Known(&'a KnownPlanet),
+}
+
+impl Tried<'_> {
+    /// It beside the jitters that `of` gives for velocities.
+    fn beside(&self, found: &Detection, q: &VelocityQuadratic, of: &dyn Fn(&VelocityQuadratic) -> Jitters) -> Fitted {
+        match self {
+            Tried::Peak(peak) => of(&found.known.beside(q)).orbit_at(1.0 / peak.porb_over_prot),
+            Tried::Known(planet) => found.known.orbit_of(planet, q, of),
+        }
+    }
+
+    /// Velocities of such an orbit (km/s).
+    fn velocities(&self, orbit: &CircularOrbit, cycles: &[f64]) -> DVector<f64> {
+        let CircularOrbit { k_kms, phi, .. } = *orbit;
+        match self {
+            Tried::Peak(peak) => {
+                let orbit = Orbit { k_kms, porb_over_prot: peak.porb_over_prot, phi };
+                DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles))
+            }
+            Tried::Known(planet) => k_kms * planet.unit_velocities(cycles),
+        }
+    }
+}
+
+/// An orbit, where one is bounded.
+type Fitted = Option<CircularOrbit>;
+
+/// Tries an orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets, and
+/// without a night the field, and the maps around which profiles are linear, are those found last.
 pub fn robustness(
     imager: &Imager,
     mut values: ParameterValues,
     settings: &DetectionSettings,
     found: &Detection,
+    tried: Tried,
 ) -> Robustness {
-    let peak = &found.best;
-    let frequency = 1.0 / peak.porb_over_prot;
-    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, frequency).orbit;
-    values.set(Parameter::K, peak.orbit.k_kms);
-    values.set(Parameter::PorbOverProt, peak.porb_over_prot);
-    values.set(Parameter::Phi, peak.orbit.phi);
+    found.known.write(&mut values);
+    let mut alone = values;
+    if found.known.first().is_none() {
+        values.set(Parameter::K, found.best.orbit.k_kms);
+        values.set(Parameter::PorbOverProt, found.best.porb_over_prot);
+        values.set(Parameter::Phi, found.best.orbit.phi);
+        alone = values;
+        alone.set(Parameter::K, 0.0);
+    }
+    let orbit = |quadratic: &VelocityQuadratic| match tried {
+        Tried::Peak(peak) => orbits::at(&found.known.beside(quadratic), 1.0 / peak.porb_over_prot).orbit,
+        Tried::Known(_) => tried.beside(found, quadratic, &Jitters::none),
+    };
     let times_d = imager.times_d();
     let mut nights = nights(&times_d, NIGHT_GAP_D);
     nights.retain(|night| times_d.len() - night.len() >= FEWEST);
@@ -85,10 +127,13 @@ pub fn robustness(
     let targets = surface.at_other_targets(at, &orbit);
     let without = surface.without_each(at, found.last(), &nights, &orbit);
     // Delta ln L is that of the blind search: around a star without a planet, beside the jitter that is found there
-    let mut alone = at;
-    alone.values.set(Parameter::K, 0.0);
+    let alone = At { values: alone, ..at };
+    let jitters = |quadratic: &VelocityQuadratic| match &found.without_jitter {
+        Some(star) => star.beside(quadratic),
+        None => Jitters::none(quadratic),
+    };
     let blind = |quadratic: &VelocityQuadratic| match &found.without_jitter {
-        Some(star) => star.beside(quadratic).orbit_at(frequency),
+        Some(_) => tried.beside(found, quadratic, &jitters),
         None => orbit(quadratic),
     };
     let star = found.without_jitter.as_ref().map_or(&found.planet_free, |without| &without.here);
@@ -97,13 +142,13 @@ pub fn robustness(
     let targets = targets.map(|(at, blind)| AtTarget { orbit: with_height(at.orbit, blind), ..at }).collect();
     let heights = surface.without_each(alone, star, &nights, &blind);
     // ln p of a night given all others is the difference of two heights of one orbit
-    let of_all = found.jitters();
-    let held_out = |of_others: Option<CircularOrbit>| {
-        let CircularOrbit { k_kms, phi, delta_ln_l, .. } = of_others?;
-        let orbit = Orbit { k_kms, porb_over_prot: peak.porb_over_prot, phi };
-        let cycles = &star.quadratic.cycles;
-        let velocities = DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles));
-        Some(of_all.delta_ln_l(&velocities) - delta_ln_l)
+    let of_all = jitters(&*match tried {
+        Tried::Peak(_) => found.known.beside(&star.quadratic),
+        Tried::Known(planet) => found.known.beside_others(planet, &star.quadratic),
+    });
+    let held_out = |of_others: Fitted| {
+        let orbit = of_others?;
+        Some(of_all.delta_ln_l(&tried.velocities(&orbit, &star.quadratic.cycles)) - orbit.delta_ln_l)
     };
     let without = without.into_iter().zip(heights);
     let without = without.map(|(orbit, blind)| (with_height(orbit, blind), held_out(blind)));

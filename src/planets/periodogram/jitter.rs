@@ -133,6 +133,16 @@ impl Jitters {
         self.scan(&[frequency])[0].trial_above_no_planet().orbit
     }
 
+    /// The most likely amplitude of the velocities `unit`, its standard error, and its height above none, each beside
+    /// the jitter that suits it best.
+    pub fn amplitude(&self, unit: &DVector<f64>) -> [f64; 3] {
+        let of = |level: &Level| {
+            let [mean, sd] = level.quadratic.amplitude(unit);
+            [mean, sd, level.ln_l + 0.5 * (mean / sd).powi(2)]
+        };
+        self.levels.iter().map(of).max_by(|a, b| a[2].total_cmp(&b[2])).unwrap_or([f64::NAN; 3])
+    }
+
     /// Height of an orbit of these velocities (km/s) beside the jitter that suits it best above no planet beside the
     /// jitter that suits this best.
     pub fn delta_ln_l(&self, velocities: &DVector<f64>) -> f64 {

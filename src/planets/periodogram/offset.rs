@@ -6,7 +6,7 @@
 
 use super::orbits::{design, mid_cycle, scan, velocities};
 use super::peaks::{Peak, parameters};
-use super::two_planets::{eliminated, without};
+use super::two_planets::without;
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector, Vector2};
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ pub struct Offset {
 /// where no constant is bounded.
 pub fn offset(quadratic: &VelocityQuadratic, frequencies: &[f64], best: f64) -> Option<Offset> {
     let (slope, curvature) = (quadratic.gradient.sum(), quadratic.information.sum());
-    let free = eliminated(quadratic, &DMatrix::from_element(quadratic.len(), 1, 1.0))?;
+    let free = quadratic.beside(&DMatrix::from_element(quadratic.len(), 1, 1.0))?;
     let beside = scan(&free, frequencies).into_iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));
     let (frequency, orbit) = beside.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))?;
     let gain = 0.5 * slope * slope / curvature + orbit.delta_ln_l - best;
@@ -84,9 +84,9 @@ fn beside(quadratic: &VelocityQuadratic, peak: &Peak) -> Option<VelocityQuadrati
     // without an amplitude, or on the edge of a search, the period is not among what is fitted
     let period = peak.sigma_porb_over_prot.and_then(|_| {
         let of_three = |k: usize, c: usize| if c < 2 { x[(k, c)] } else { by_frequency(k) };
-        eliminated(&around, &DMatrix::from_fn(cycles.len(), 3, of_three))
+        around.beside(&DMatrix::from_fn(cycles.len(), 3, of_three))
     });
-    period.or_else(|| eliminated(&around, &x))
+    period.or_else(|| around.beside(&x))
 }
 
 #[cfg(test)]
@@ -121,7 +121,7 @@ mod tests {
             let quadratic = sample::independent(&cycles, &rv, &sigma);
             // at the orbit that is the best beside constants
             let x = DMatrix::from_columns(&[all.clone(), of_second.clone()]);
-            let free = eliminated(&quadratic, &x).unwrap();
+            let free = quadratic.beside(&x).unwrap();
             let peak = refined(&free, &frequencies, &truth);
             let (values, errors) = common_velocities(&quadratic, &common, Some(&peak)).unwrap();
             squares += ((values[1] - 0.12) / errors[1]).powi(2) / f64::from(trials as u32);

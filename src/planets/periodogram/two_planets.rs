@@ -2,16 +2,15 @@
 //! together.
 //!
 //! At each period the 4 x 4 system in both (a, b) is solved by blocks: with the first orbit's pair eliminated, what is
-//! left is a quadratic in the velocities again, of gradient `Q g` and information `Q I`, `Q = 1 - I X A^-1 X'` (Schur
-//! complement). The periodogram of that is the gain, and gradients without a second planet scatter with its own
-//! information.
+//! left is a quadratic in the velocities again. The periodogram of that is the gain, and gradients without a second
+//! planet scatter with its own information.
 
 use super::frequencies::Frequencies;
 use super::orbits::{design, velocities};
 use super::peaks::{Peak, parameters, peak, steps};
 use super::refine::{Maximum, Model};
 use crate::planets::velocities::VelocityQuadratic;
-use nalgebra::{DMatrix, DVector, Vector2, Vector3};
+use nalgebra::{DVector, Vector2, Vector3};
 
 /// Two orbits with their errors from the curvature in all six parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,20 +23,7 @@ pub struct TwoOrbits {
 
 /// The quadratic with the orbit of that frequency (orbits a rotation cycle) left free; `None` where it is not bounded.
 pub fn without(quadratic: &VelocityQuadratic, frequency: f64) -> Option<VelocityQuadratic> {
-    eliminated(quadratic, &design(&quadratic.cycles, &[frequency]))
-}
-
-/// The quadratic with the amplitudes of the columns of `x` left free.
-pub(super) fn eliminated(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> Option<VelocityQuadratic> {
-    let ix = &quadratic.information * x;
-    let answer = x.tr_mul(&ix).cholesky()?.solve(&x.transpose());
-    let keep = DMatrix::identity(quadratic.len(), quadratic.len()) - &ix * answer;
-    let information = &keep * &quadratic.information;
-    Some(VelocityQuadratic {
-        cycles: quadratic.cycles.clone(),
-        gradient: &keep * &quadratic.gradient,
-        information: 0.5 * (&information + information.transpose()),
-    })
+    quadratic.beside(&design(&quadratic.cycles, &[frequency]))
 }
 
 /// Both orbits refined together, from the `first` and from the `second` found beside it. `None` where they have no

@@ -5,10 +5,9 @@
 //! with its tables); an optimum or a chain takes a planet for granted, so that `optimise`, `sample` and `batch` hold
 //! its [`SearchSummary`], whose verdict heads theirs.
 //!
-//! `known_planet` is on planets of known ephemeris, `priors` on orbits that a config does not allow.
+//! `priors` is on orbits that a config does not allow.
 
 mod files;
-mod known_planet;
 mod options;
 mod priors;
 mod quantities;
@@ -20,6 +19,6 @@ mod table;
 pub use files::FILES;
 pub use options::{BlindSearchError, BlindSearchOptions, RobustnessOf};
 pub use quantities::QuantitiesRecord;
-pub use record::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
+pub use record::{FILE, KnownPlanetRecord, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 pub use search::BlindSearch;
 pub use summary::SearchSummary;

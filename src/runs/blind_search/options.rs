@@ -1,5 +1,6 @@
 //! What to search for, and how: one set of options for all commands.
 
+use crate::data::ephemeris::ephemerides;
 use crate::data::scene::Scene;
 use crate::inference::detection::DetectionSettings;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
@@ -91,6 +92,7 @@ impl BlindSearchOptions {
             search: SearchSettings { draws: self.draws, seed: self.seed },
             eccentric: self.eccentric,
             second_planet: self.second_planet,
+            known: ephemerides(&scene.settings),
             other_rotation: scene.measured.other_rotation,
         }
     }

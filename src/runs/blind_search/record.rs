@@ -4,7 +4,7 @@ use super::quantities::QuantitiesRecord;
 use super::search::BlindSearch;
 use crate::data::io::provenance::Provenance;
 use crate::data::io::saved::Saved;
-use crate::inference::detection::{HeldOut, Robustness, WithoutNight};
+use crate::inference::detection::{HeldOut, KnownPlanet, Robustness, WithoutNight};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{OrbitQuantities, ParameterValues};
 use crate::numerics::json::number_or_null;
@@ -12,6 +12,7 @@ use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{CircularOrbit, KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
+use crate::star::{Eccentric, Orbit, Shape};
 use crate::surface::{AtTarget, Change, ConstantVelocity, FoundDrift, OtherRotation, SpotField};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -25,10 +26,17 @@ const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
 /// The content of `periodogram.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeriodogramFile {
-    /// What is said of the best orbit.
+    /// What is said of the best orbit; where the first planet of the config has a known ephemeris, of that planet.
     pub verdict: Verdict,
-    /// In the expansion around its own image; its errors count the period's.
+    /// In the expansion around its own image; its errors count the period's. Where the first planet of the config has a
+    /// known ephemeris, its orbit.
     pub best: OrbitRecord,
+    /// Planets of known ephemeris, in the order of the config; peaks are of the search beside them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub known_planets: Vec<KnownPlanetRecord>,
+    /// What is said of the highest peak, where the verdict is on a planet of known ephemeris.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind: Option<Verdict>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
     /// The same of what is usually quoted of the orbit, times nearest to those found.
@@ -114,6 +122,28 @@ pub struct OrbitRecord {
     /// What is usually quoted of it.
     #[serde(flatten)]
     pub quantities: QuantitiesRecord,
+}
+
+/// A planet of known ephemeris.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KnownPlanetRecord {
+    /// Its number in the config, from 1.
+    pub planet: usize,
+    /// What is said of it.
+    pub verdict: Verdict,
+    /// Its orbit: K over all ephemerides within their errors, all else as given.
+    pub orbit: OrbitRecord,
+    /// Its shape, where the config gives one; a circle otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
+}
+
+impl KnownPlanetRecord {
+    /// The orbit as a motion of the star.
+    pub fn eccentric(&self) -> Eccentric {
+        let OrbitRecord { k_kms, porb_over_prot, phi, .. } = self.orbit;
+        Eccentric { orbit: Orbit { k_kms, porb_over_prot, phi }, shape: self.shape.unwrap_or_default() }
+    }
 }
 
 /// A peak of the periodogram.
@@ -349,10 +379,18 @@ impl PeriodogramFile {
         // the highest one with the spots as they are beside it
         let mut all = peaks(&found.blind);
         if let Some(highest) = all.first_mut() {
-            highest.orbit = best.clone();
+            highest.orbit = orbit(found.highest());
         }
+        let known_planet = |(planet, verdict): (&KnownPlanet, &Verdict)| KnownPlanetRecord {
+            planet: planet.ephemeris.planet + 1,
+            verdict: verdict.clone(),
+            orbit: orbit(&planet.peak()),
+            shape: planet.ephemeris.shape,
+        };
         PeriodogramFile {
             verdict: search.verdict.clone(),
+            known_planets: found.known.planets.iter().zip(&search.known).map(known_planet).collect(),
+            blind: search.blind.clone(),
             truth: scene.truth,
             derived_truth: best.quantities.injected(scene.truth, &quantities),
             best,

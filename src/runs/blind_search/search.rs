@@ -1,15 +1,16 @@
 //! The search of a star, what is to be said of it, and the verdict.
 
-use super::known_planet::{KnownPlanet, known_planets};
 use super::options::{BlindSearchError, BlindSearchOptions, RobustnessOf};
 use super::priors::within_priors;
 use super::summary::SearchSummary;
 use crate::data::io::provenance::Measured;
 use crate::data::scene::Scene;
-use crate::inference::detection::{Detection, DetectionSettings, Evidence, Robustness, Stage, robustness};
+use crate::inference::detection::{
+    Detection, DetectionSettings, Evidence, KnownPlanet, Robustness, Stage, Tried, robustness,
+};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Parameter, for_blind_search};
-use crate::planets::verdict::{Remark, Verdict};
+use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
 use crate::surface::{Constants, Explained, Linearised};
 use std::borrow::Cow;
 
@@ -29,8 +30,12 @@ pub struct BlindSearch<'a> {
     pub(super) constants: Option<Constants>,
     /// Bayes factors, where the config has priors for them.
     pub(super) evidence: Option<EvidenceRecord>,
-    /// What is said of the best orbit, or of a planet of known ephemeris.
+    /// What is said of the best orbit, or of the first planet where that is one of known ephemeris.
     pub verdict: Verdict,
+    /// What is said of each planet of known ephemeris, in the order of the config.
+    pub known: Vec<Verdict>,
+    /// What is said of the highest peak, where the verdict is on a planet of known ephemeris.
+    pub blind: Option<Verdict>,
     /// What has to be known beside the verdict.
     pub remarks: Vec<Remark>,
 }
@@ -73,37 +78,39 @@ impl<'a> BlindSearch<'a> {
             RobustnessOf::Candidates => detection.is_candidate(),
             RobustnessOf::None => false,
         };
-        let robustness = is_tried.then(|| {
+        let try_out = |tried| {
             report("other targets, without each night");
             let values = for_blind_search(scene.settings.values, &scene.settings.free);
-            robustness(imager, values, &settings, &detection)
-        });
+            robustness(imager, values, &settings, &detection, tried)
+        };
+        let first = detection.known.first();
+        let robustness = is_tried.then(|| try_out(first.map_or(Tried::Peak(&detection.best), Tried::Known)));
         let surface = settings.surface.model();
         let explained = |here: &Linearised| surface.explained(imager, &scene.observations, here);
         let (planet_free, at_best) = (explained(&detection.planet_free), explained(detection.last()));
         let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
         let evidence = Evidence { imager, settings: &settings, robustness: robustness.as_ref(), misfit: &misfit };
         let mut remarks = detection.remarks(&evidence);
-        let of_the_period = detection.of_the_period();
-        let of_the_star: Vec<Remark> = remarks.iter().filter(|r| !of_the_period.contains(r)).cloned().collect();
         let mut verdict = detection.verdict(&remarks);
-        // where an orbit is asked for, of those that are allowed
-        if scene.settings.free.iter().any(|f| f.parameter == Parameter::K) {
+        let of_the_star = detection.of_the_star(&evidence);
+        let verdict_on = |planet: &KnownPlanet| known(planet, detection.known.planets.len(), &of_the_star);
+        let known: Vec<Verdict> = detection.known.planets.iter().map(verdict_on).collect();
+        let mut blind = None;
+        if first.is_some() {
+            // what is said of the highest peak beside it
+            let mut of_the_peak = of_the_star.clone();
+            let is_tried = detection.is_candidate() && options.robustness != RobustnessOf::None;
+            let tried = is_tried.then(|| try_out(Tried::Peak(detection.highest())));
+            of_the_peak.extend(detection.of_the_peak(tried.as_ref()));
+            blind = Some(detection.verdict(&of_the_peak));
+            verdict = known[0].clone().with(&remarks);
+        } else if scene.settings.free.iter().any(|f| f.parameter == Parameter::K) {
+            // where an orbit is asked for, of those that are allowed
             verdict = within_priors(scene, &detection, verdict, &mut remarks);
-        }
-        // on a planet of known ephemeris where the config looks for one first; what else is found is said beside it
-        let blind = verdict.sentence.clone();
-        for KnownPlanet { is_first, verdict: known } in known_planets(scene, &settings, &detection, &of_the_star) {
-            if is_first {
-                remarks = of_the_star.clone();
-                remarks.push(Remark::note(format!("Blind search, with the known planet in the model: {blind}")));
-                verdict = known;
-            } else {
-                remarks.push(Remark::note(known.sentence.clone()));
-            }
         }
         if let Some(text) = scene.measured.problem() {
             verdict = Verdict::not_judged(text);
+            blind = None;
         }
         let evidence = scene.evidence(&detection.jitters());
         let constants = detection.constants(imager, &settings.nuisances);
@@ -117,6 +124,8 @@ impl<'a> BlindSearch<'a> {
             constants,
             evidence,
             verdict,
+            known,
+            blind,
             remarks,
         }
     }
@@ -129,15 +138,29 @@ impl<'a> BlindSearch<'a> {
 
     /// The head of it, for results that rest on it.
     pub fn summary(self) -> SearchSummary {
-        let BlindSearch { detection, verdict, mut remarks, evidence, .. } = self;
+        let BlindSearch { detection, verdict, known, blind, mut remarks, evidence, .. } = self;
+        let beside = known.into_iter().skip(usize::from(blind.is_some())).map(|verdict| verdict.sentence);
+        remarks.extend(beside.map(Remark::note));
+        let blind = blind.map(|blind| format!("Blind search beside the known planets: {}", blind.sentence));
+        remarks.extend(blind.map(Remark::note));
         remarks.extend(evidence.iter().map(|evidence| Remark::note(evidence.sentence.clone())));
         SearchSummary { verdict, remarks, rotation: Some(detection.blind.rotation.clone()), evidence }
     }
 }
 
+/// What is said of a planet of known ephemeris, one of so many, beside the remarks on its star.
+fn known(planet: &KnownPlanet, of: usize, remarks: &[Remark]) -> Verdict {
+    let Some(k) = planet.k else { return Verdict::not_judged(UNBOUNDED) };
+    let [k_kms, sigma_k_kms] = k.moments;
+    let signal = Signal { period_d: planet.ephemeris.period_d[0], sigma_period_d: None, k_kms, sigma_k_kms };
+    let number = (of > 1).then_some(planet.ephemeris.planet + 1);
+    Verdict::of_known(number, planet.alone, signal, k.upper95, remarks)
+}
+
 fn message(stage: Stage) -> String {
     match stage {
         Stage::PlanetFree => "planet-free map".to_owned(),
+        Stage::Known => "map with the known planets".to_owned(),
         Stage::Change => "testing for spot evolution".to_owned(),
         Stage::Search => "searching, FAP simulations".to_owned(),
         Stage::BestOrbit(round) => format!("map at the best orbit, round {round}"),

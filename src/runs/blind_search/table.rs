@@ -26,8 +26,11 @@ impl PeriodogramFile {
 
     /// The text, a line or a table after the other.
     fn table(&self, rotation_period_d: f64) -> String {
-        let best = std::slice::from_ref(&self.best);
-        let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(best, rotation_period_d);
+        let mut text = self.verdicts() + "\n";
+        text += &match &self.blind {
+            Some(_) => self.orbits(&self.known_orbits(), rotation_period_d),
+            None => self.orbits(std::slice::from_ref(&self.best), rotation_period_d),
+        };
         text += &meanings(&self.best.quantities);
         if let Some(field) = &self.field {
             text += &field.line();
@@ -41,6 +44,9 @@ impl PeriodogramFile {
         }
         if let Some(drift) = &self.drift {
             text += &format!("{}\n", drift.line());
+        }
+        if self.blind.is_some() {
+            text += &format!("blind search beside the known planet{}:\n", plural(self.known_planets.len()));
         }
         text += &format!("{}\n", chance(&self.false_alarm));
         if let Some(evidence) = &self.evidence {
@@ -65,12 +71,26 @@ impl PeriodogramFile {
         text
     }
 
+    /// What is said of the planets, a line each.
+    fn verdicts(&self) -> String {
+        let mut lines = vec![self.verdict.sentence.clone()];
+        let beside = self.known_planets.iter().skip(usize::from(self.blind.is_some()));
+        lines.extend(beside.map(|planet| planet.verdict.sentence.clone()));
+        lines.extend(self.blind.iter().map(|blind| format!("Blind search: {}", blind.sentence)));
+        lines.iter().map(|line| format!("{line}\n")).collect()
+    }
+
+    fn known_orbits(&self) -> Vec<OrbitRecord> {
+        self.known_planets.iter().map(|planet| planet.orbit.clone()).collect()
+    }
+
     /// Parameters of one orbit or several, a line each, beside the true ones of the first.
     fn orbits(&self, orbits: &[OrbitRecord], prot: f64) -> String {
         let truth = self.truth.filter(|_| orbits.len() == 1);
         let head = if truth.is_some() { &["parameter", "truth"][..] } else { &["parameter"] };
         let mut head: Vec<String> = head.iter().map(|s| (*s).to_owned()).collect();
-        head.extend(orbits.iter().flat_map(|_| ["best".to_owned(), "sigma".to_owned()]));
+        let number = |k: usize| if orbits.len() > 1 { format!("planet {}", k + 1) } else { "best".to_owned() };
+        head.extend((0..orbits.len()).flat_map(|k| [number(k), "sigma".to_owned()]));
         let mut rows = vec![head];
         for name in ["k_kms", "period_d", "porb_over_prot", "phi"] {
             let value = |o: &OrbitRecord| match name {
@@ -120,6 +140,10 @@ impl PeriodogramFile {
         };
         OrbitQuantity::ALL.into_iter().filter_map(row).collect()
     }
+}
+
+fn plural(count: usize) -> &'static str {
+    if count > 1 { "s" } else { "" }
 }
 
 /// What the names in the table of orbits mean, a line each.

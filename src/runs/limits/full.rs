@@ -135,7 +135,7 @@ impl WholeWay {
             let values = for_blind_search(star.settings.values, &star.settings.free);
             let at = At { imager: &star.imager, values, nuisances: &settings.detection.nuisances };
             let (surface, frequencies) = (settings.detection.surface.model(), &settings.frequencies);
-            let found = PlanetFree::find(&*surface, at, frequencies, settings.detection.search, &|_| ()).ok()?;
+            let found = PlanetFree::find(&*surface, at, frequencies, &settings.detection, &|_| ()).ok()?;
             let best = found.blind.best();
             let highest = Highest {
                 frequency: 1.0 / best.porb_over_prot,

@@ -4,7 +4,7 @@
 //! that is not in the model. A planet that the profiles show as they are is taken out first, with the spots as they are
 //! beside it.
 
-use crate::inference::detection::{Detection, DetectionSettings, jitters};
+use crate::inference::detection::{Detection, DetectionSettings, jitters_beside};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::injections::Highest;
 use crate::planets::periodogram::orbits::{Trial, scan};
@@ -106,13 +106,16 @@ impl<'a> Shortcut<'a> {
         let jitter = found.without_jitter.as_ref().map_or(Jitter::Known, |without| Jitter::Fitted(without.scale_kms));
         let (mut before, mut removed) = (found.blind.clone(), None);
         let mut at = At { imager, values, nuisances: &detection.nuisances };
+        found.known.write(&mut at.values);
         if removes {
-            let CircularOrbit { k_kms, phi, .. } = found.best.orbit;
-            let porb_over_prot = found.best.porb_over_prot;
+            let CircularOrbit { k_kms, phi, .. } = found.highest().orbit;
+            let porb_over_prot = found.highest().porb_over_prot;
             let orbit = Orbit { k_kms: -k_kms, porb_over_prot, phi };
-            at.values.set(Parameter::K, k_kms);
-            at.values.set(Parameter::PorbOverProt, porb_over_prot);
-            at.values.set(Parameter::Phi, phi);
+            if found.known.first().is_none() {
+                at.values.set(Parameter::K, k_kms);
+                at.values.set(Parameter::PorbOverProt, porb_over_prot);
+                at.values.set(Parameter::Phi, phi);
+            }
             // spots and jitter as they are beside the planet
             star = found.last().clone();
             let mut without_jitter = surface.without_jitter(at, &star)?;
@@ -120,7 +123,8 @@ impl<'a> Shortcut<'a> {
                 here.expansion = with(&here.expansion, &orbit);
                 here.quadratic = surface.velocities(&here.expansion, &detection.nuisances).ok_or(Unbounded)?;
             }
-            before = Search::with_jitter(&jitters(&star, without_jitter.as_ref()), frequencies, detection.search)?;
+            let jitters = jitters_beside(&found.known, &star, without_jitter.as_ref());
+            before = Search::with_jitter(&jitters, frequencies, detection.search)?;
             removed = Some(orbit);
         }
         let mut fields = surface.absorbing(at, &star)?;
@@ -129,6 +133,11 @@ impl<'a> Shortcut<'a> {
                 put_into(velocities, &orbit);
                 put_into(held, &orbit);
             }
+        }
+        // orbits are searched beside those of known planets
+        for OfField { velocities, held, .. } in &mut fields {
+            *velocities = found.known.beside(velocities).into_owned();
+            *held = found.known.beside(held).into_owned();
         }
         let level = before.false_alarm.level(CANDIDATE_FAP);
         Ok(Shortcut { settings, surface, found, removed, star, fields, jitter, before, level })
@@ -192,6 +201,7 @@ impl Shortcut<'_> {
         let LimitSettings { detection, frequencies, .. } = self.settings;
         let moved = with(&self.star.expansion, orbit);
         let quadratic: VelocityQuadratic = self.surface.velocities(&moved, &detection.nuisances)?;
+        let quadratic = self.found.known.beside(&quadratic);
         let trials = scan(&quadratic, &frequencies.per_cycle);
         let summits = scan(&quadratic, &summits(&trials));
         let highest = |trials: &[Trial]| {

@@ -60,7 +60,7 @@ pub fn hold(
     for _ in 0..ROUNDS {
         let here = linearised(imager, usual(imager, &basis, values, known, near.as_ref())?, &systemic)?;
         let orbit = frequencies.and_then(|frequencies| best_orbit(&here.quadratic, frequencies));
-        let Some(found) = here.constants(imager, &systemic, orbit.as_ref()) else { break };
+        let Some(found) = here.constants(imager, &systemic, (orbit.as_ref(), None)) else { break };
         if let Some(Peak { porb_over_prot, orbit, .. }) = orbit {
             values.set(Parameter::K, orbit.k_kms);
             values.set(Parameter::PorbOverProt, porb_over_prot);

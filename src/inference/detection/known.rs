@@ -1,0 +1,288 @@
+//! Planets of known ephemeris: their masses are a question of one number each, K.
+//!
+//! No other period is searched for them, so that the false-alarm probability of each is that of one period and one
+//! sign: how often a star without it, the other known planets there, has a K as many standard errors above zero at the
+//! ephemeris as given: its errors make planets harder to see, not false ones more frequent. K and its limit, with the
+//! planets in the model, are over all ephemerides within the errors (`docs/method.md` section 4): a tenth of an orbit
+//! beside the true one, K would come out by a fifth too small.
+//!
+//! The blind search beside them leaves their amplitudes free, and where an ephemeris is uncertain what its errors add.
+
+use crate::model::{Ephemeris, ParameterValues};
+use crate::planets::mixture::{Mixture, Part};
+use crate::planets::periodogram::orbits::SIGMA_OF_UNKNOWN_PHASE;
+use crate::planets::periodogram::{CircularOrbit, Jitters, Peak};
+use crate::planets::velocities::VelocityQuadratic;
+use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
+
+/// Ephemerides are tried within so many standard errors.
+const REACH: f64 = 3.5;
+
+/// So many periods and so many conjunctions: a step is at most a hundredth of an orbit.
+const NODES: usize = 71;
+
+/// An ephemeris that is wrong by this part of an orbit adds less than a twentieth of K to the velocities.
+const SMALL_ERROR: f64 = 0.01;
+
+/// K of a planet of known ephemeris.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownPlanet {
+    /// Its ephemeris.
+    pub ephemeris: Ephemeris,
+    /// K and its standard error (km/s) of a star without it, where K may have either sign.
+    pub alone: [f64; 2],
+    /// With the planet in the model; `None` where the profiles do not bound it.
+    pub k: Option<KnownAmplitude>,
+}
+
+/// K over all ephemerides within their errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownAmplitude {
+    /// Mean and standard deviation (km/s).
+    pub moments: [f64; 2],
+    /// 95 % upper limit (km/s), for K of 0 or more.
+    pub upper95: f64,
+}
+
+/// All planets of known ephemeris of a star.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Known {
+    /// The planets.
+    pub planets: Vec<KnownPlanet>,
+}
+
+impl Known {
+    /// The star without them: K of each with the others' free.
+    pub fn absent(ephemerides: &[Ephemeris], quadratic: &VelocityQuadratic) -> Self {
+        let planet = |ephemeris: &Ephemeris| {
+            let alone = beside(others(ephemerides, ephemeris), quadratic).amplitude(&unit(ephemeris, quadratic));
+            KnownPlanet { ephemeris: *ephemeris, alone, k: None }
+        };
+        Known { planets: ephemerides.iter().map(planet).collect() }
+    }
+
+    /// Writes their orbits into `values`, of the K that a star without them shows.
+    pub fn write(&self, values: &mut ParameterValues) {
+        self.planets.iter().for_each(|planet| planet.ephemeris.write(planet.alone[0].max(0.0), values));
+    }
+
+    /// The same with what the star with them says of K.
+    #[must_use]
+    pub fn present(mut self, quadratic: &VelocityQuadratic) -> Self {
+        let ephemerides: Vec<Ephemeris> = self.ephemerides().collect();
+        for planet in &mut self.planets {
+            let rest = beside(others(&ephemerides, &planet.ephemeris), quadratic);
+            planet.k = over_errors(&rest, &planet.ephemeris)
+                .map(|k| KnownAmplitude { moments: k.moments(), upper95: k.upper95() });
+        }
+        self
+    }
+
+    /// The first planet of the config, where it is one of them: what is asked for first.
+    pub fn first(&self) -> Option<&KnownPlanet> {
+        self.planets.first().filter(|planet| planet.ephemeris.planet == 0)
+    }
+
+    /// Velocities with the orbits of all left free; as they are where those are not bounded.
+    pub fn beside<'a>(&self, quadratic: &'a VelocityQuadratic) -> Cow<'a, VelocityQuadratic> {
+        beside(self.ephemerides(), quadratic)
+    }
+
+    /// The same with the orbits of all but that planet left free.
+    pub fn beside_others<'a>(
+        &self,
+        planet: &KnownPlanet,
+        quadratic: &'a VelocityQuadratic,
+    ) -> Cow<'a, VelocityQuadratic> {
+        let others = self.ephemerides().filter(|of| of.planet != planet.ephemeris.planet);
+        beside(others, quadratic)
+    }
+
+    /// The columns that are left free, profiles x amplitudes; `None` where there is no such planet.
+    pub fn columns(&self, cycles: &[f64]) -> Option<DMatrix<f64>> {
+        columns(self.ephemerides(), cycles)
+    }
+
+    fn ephemerides(&self) -> impl Iterator<Item = Ephemeris> + '_ {
+        self.planets.iter().map(|planet| planet.ephemeris)
+    }
+
+    /// The orbit of a `planet` at its ephemeris, the others' K free, beside the jitters that `of` gives for velocities:
+    /// K may have either sign.
+    pub fn orbit_of(
+        &self,
+        planet: &KnownPlanet,
+        quadratic: &VelocityQuadratic,
+        jitters: &dyn Fn(&VelocityQuadratic) -> Jitters,
+    ) -> Option<CircularOrbit> {
+        let rest = self.beside_others(planet, quadratic);
+        let [k_kms, sigma_k_kms, delta_ln_l] = jitters(&rest).amplitude(&unit(&planet.ephemeris, quadratic));
+        let CircularOrbit { phi, sigma_phi, .. } = planet.orbit();
+        delta_ln_l.is_finite().then_some(CircularOrbit { k_kms, sigma_k_kms, phi, sigma_phi, delta_ln_l })
+    }
+}
+
+impl KnownPlanet {
+    /// The orbit, of the K of a star with it where it is bounded.
+    pub fn orbit(&self) -> CircularOrbit {
+        let mut values = ParameterValues::of_eight([0.0; 8]);
+        self.ephemeris.write(0.0, &mut values);
+        let [k_kms, sigma_k_kms] = self.k.map_or(self.alone, |k| k.moments);
+        CircularOrbit {
+            k_kms,
+            sigma_k_kms,
+            phi: values[self.ephemeris.of().phi],
+            sigma_phi: (self.ephemeris.conjunction_d[1] / self.ephemeris.period_d[0]).min(SIGMA_OF_UNKNOWN_PHASE),
+            delta_ln_l: 0.5 * (self.alone[0] / self.alone[1]).powi(2),
+        }
+    }
+
+    /// The same as a peak of a search would be.
+    pub fn peak(&self) -> Peak {
+        let [period_d, sigma_d] = self.ephemeris.period_d;
+        let prot = self.ephemeris.clock.rotation_period_d;
+        Peak {
+            porb_over_prot: period_d / prot,
+            sigma_porb_over_prot: (sigma_d > 0.0).then_some(sigma_d / prot),
+            orbit: self.orbit(),
+            covariance: None,
+            on_edge: false,
+            alias: None,
+            imitation: None,
+        }
+    }
+
+    /// Its velocities for K = 1 km/s.
+    pub fn unit_velocities(&self, cycles: &[f64]) -> DVector<f64> {
+        let Ephemeris { period_d: [period_d, _], conjunction_d: [conjunction_d, _], .. } = self.ephemeris;
+        DVector::from_vec(self.ephemeris.unit_velocities(period_d, conjunction_d, cycles))
+    }
+}
+
+fn others<'a>(all: &'a [Ephemeris], but: &'a Ephemeris) -> impl Iterator<Item = Ephemeris> + 'a {
+    all.iter().filter(|of| of.planet != but.planet).copied()
+}
+
+fn unit(ephemeris: &Ephemeris, quadratic: &VelocityQuadratic) -> DVector<f64> {
+    let Ephemeris { period_d: [period_d, _], conjunction_d: [conjunction_d, _], .. } = *ephemeris;
+    DVector::from_vec(ephemeris.unit_velocities(period_d, conjunction_d, &quadratic.cycles))
+}
+
+fn beside(
+    ephemerides: impl Iterator<Item = Ephemeris>,
+    quadratic: &VelocityQuadratic,
+) -> Cow<'_, VelocityQuadratic> {
+    let rest = columns(ephemerides, &quadratic.cycles).and_then(|columns| quadratic.beside(&columns));
+    rest.map_or(Cow::Borrowed(quadratic), Cow::Owned)
+}
+
+/// Velocities at each ephemeris, and what a step in period and conjunction adds where they are uncertain.
+fn columns(ephemerides: impl Iterator<Item = Ephemeris>, cycles: &[f64]) -> Option<DMatrix<f64>> {
+    let mut columns: Vec<DVector<f64>> = Vec::new();
+    for ephemeris in ephemerides {
+        let Ephemeris { period_d: [period, period_sd], conjunction_d: [conjunction, conjunction_sd], clock, .. } =
+            ephemeris;
+        let at = |of_period: f64, of_conjunction: f64| {
+            let (period, conjunction) = (period + of_period, conjunction + of_conjunction);
+            DVector::from_vec(ephemeris.unit_velocities(period, conjunction, cycles))
+        };
+        columns.push(at(0.0, 0.0));
+        if conjunction_sd > SMALL_ERROR * period {
+            columns.push(at(0.0, conjunction_sd) - at(0.0, -conjunction_sd));
+        }
+        let drift = |cycle: &f64| (clock.epoch_d + clock.rotation_period_d * cycle - conjunction).abs() * period_sd;
+        if cycles.iter().map(drift).fold(0.0, f64::max) > SMALL_ERROR * period * period {
+            columns.push(at(period_sd, 0.0) - at(-period_sd, 0.0));
+        }
+    }
+    (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
+}
+
+/// K over all ephemerides within their errors: of each, its prior and how well its orbit fits. `None` where the
+/// profiles do not bound it.
+fn over_errors(quadratic: &VelocityQuadratic, ephemeris: &Ephemeris) -> Option<Mixture> {
+    let mut parts = Vec::new();
+    for (period_d, of_period) in within(ephemeris.period_d) {
+        for (conjunction_d, of_conjunction) in within(ephemeris.conjunction_d) {
+            let unit = ephemeris.unit_velocities(period_d, conjunction_d, &quadratic.cycles);
+            let [mean, sd] = quadratic.amplitude(&DVector::from_vec(unit));
+            // the integral over all K of how well the orbit fits
+            parts.push(Part { ln_weight: of_period + of_conjunction + 0.5 * (mean / sd).powi(2) + sd.ln(), mean, sd });
+        }
+    }
+    Mixture::new(parts)
+}
+
+/// Numbers within the errors, [`REACH`] standard errors to both sides, each with ln of its prior; one where there is no
+/// error.
+fn within([mean, sd]: [f64; 2]) -> Vec<(f64, f64)> {
+    if sd == 0.0 {
+        return vec![(mean, 0.0)];
+    }
+    let deviate = |j: usize| REACH * (2.0 * j as f64 / (NODES - 1) as f64 - 1.0);
+    (0..NODES).map(deviate).map(|z| (mean + sd * z, -0.5 * z * z)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Clock;
+
+    const CLOCK: Clock = Clock { rotation_period_d: 2.0, epoch_d: 0.0 };
+
+    fn ephemeris(planet: usize, period_d: f64, conjunction_d: [f64; 2]) -> Ephemeris {
+        Ephemeris { planet, conjunction_d, period_d: [period_d, 0.0], shape: None, clock: CLOCK }
+    }
+
+    /// 30 velocities with errors of 0.05 km/s of these orbits: ephemeris and K.
+    fn quadratic(orbits: &[(Ephemeris, f64)]) -> VelocityQuadratic {
+        let cycles: Vec<f64> = (0..30).map(|k| 0.37 * f64::from(k)).collect();
+        let information = DMatrix::identity(30, 30) / 0.05f64.powi(2);
+        let mut velocities = DVector::zeros(30);
+        for (ephemeris, k_kms) in orbits {
+            let [of_period, of_conjunction] = [ephemeris.period_d[0], ephemeris.conjunction_d[0]];
+            velocities += *k_kms * DVector::from_vec(ephemeris.unit_velocities(of_period, of_conjunction, &cycles));
+        }
+        VelocityQuadratic { gradient: &information * velocities, cycles, information }
+    }
+
+    /// A planet of 0.1 km/s whose conjunction comes two standard errors after the one that is given, 0.16 orbits: there
+    /// K is a half of what it is.
+    #[test]
+    fn an_ephemeris_that_is_off_leaves_k_as_it_is() {
+        let quadratic = quadratic(&[(ephemeris(0, 5.0, [7.8, 0.0]), 0.1)]);
+        let given = ephemeris(0, 5.0, [7.0, 0.4]);
+        let [there, _] = quadratic.amplitude(&unit(&given, &quadratic));
+        let k = over_errors(&quadratic, &given).unwrap();
+        let [mean, sd] = k.moments();
+        assert!((there / 0.1 - 0.54).abs() < 0.03, "{there}");
+        assert!((mean - 0.1).abs() < sd && sd < 0.02, "{mean} +- {sd}");
+        let known = ephemeris(0, 5.0, [7.0, 0.0]);
+        let [alone, _] = over_errors(&quadratic, &known).unwrap().moments();
+        assert!((alone - there).abs() < 1e-12);
+        assert!(k.upper95() > 0.11 && k.upper95() < 0.14, "{}", k.upper95());
+        // what the error adds is left free: no orbit remains
+        let known = Known::absent(&[given], &quadratic);
+        let rest = known.beside(&quadratic);
+        let left = rest.gradient.norm() / quadratic.gradient.norm();
+        assert!(left < 0.15, "{left}");
+    }
+
+    /// Two planets at once: K of each as it is, and nothing is left beside them; alone, each takes a part of the other.
+    #[test]
+    fn two_known_planets_do_not_take_from_each_other() {
+        let (b, c) = (ephemeris(0, 5.0, [7.0, 0.0]), ephemeris(1, 9.1, [3.0, 0.0]));
+        let quadratic = quadratic(&[(b, 0.06), (c, 0.04)]);
+        let known = Known::absent(&[b, c], &quadratic).present(&quadratic);
+        for (planet, k) in known.planets.iter().zip([0.06, 0.04]) {
+            let [mean, sd] = planet.k.unwrap().moments;
+            assert!((planet.alone[0] - k).abs() < 1e-12 && (mean - k).abs() < 1e-9 && sd > 0.012, "{planet:?}");
+            let orbit = known.orbit_of(planet, &quadratic, &Jitters::none).unwrap();
+            assert!((orbit.k_kms - k).abs() < 1e-12 && orbit.delta_ln_l > 1.0, "{orbit:?}");
+        }
+        assert!(known.beside(&quadratic).gradient.norm() < 1e-9 * quadratic.gradient.norm());
+        let [alone, _] = quadratic.amplitude(&unit(&b, &quadratic));
+        assert!((alone - 0.06).abs() > 1e-4, "{alone}");
+    }
+}
