@@ -184,7 +184,7 @@ pub use runs::log_posterior::LogPosterior;
 pub use runs::manifest::RunSummary;
 pub use runs::maps::{MapError, Maps};
 pub use runs::optimum::OptimumFile;
-pub use runs::plan::{Forecast, ForecastError, PlanSettings};
+pub use runs::plan::{Forecast, ForecastError, Next, PlanSettings};
 pub use runs::pool::Pool;
 pub use runs::run::{Conclusion, Meter, Pace, Run, RunError, StartFrom};
 pub use runs::simulated::{SimulateError, Simulated};

@@ -72,7 +72,7 @@ def limits(
 ) -> str: ...
 def plan(
     configs: Sequence[_Config],
-    nights: Sequence[int],
+    nights: tuple[Sequence[int], tuple[int, float | None, float | None] | None],
     options: tuple[float | None, float | None, bool, int, int, int],
     out: str,
     manner: _Manner,

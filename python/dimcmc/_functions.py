@@ -345,6 +345,9 @@ def plan(
     configs: ConfigLike | Sequence[ConfigLike],
     *,
     nights: Sequence[int] = (),
+    next: int | None = None,
+    period_d: float | None = None,
+    alias_d: float | None = None,
     min_period_d: float | None = None,
     max_period_d: float | None = None,
     fixed: bool = False,
@@ -365,6 +368,13 @@ def plan(
         section ``plan``.
     nights : sequence of int
         Numbers of nights, one schedule each.
+    next : int, optional
+        Choose this number of the nights: those that most reduce the uncertainty of K of one planet
+        (``summary["schedules"][0]["next"]``). Not with ``nights``.
+    period_d : float, optional
+        Period of that planet (d); by default that of the config's planet.
+    alias_d : float, optional
+        Choose the nights that best tell that planet from one of this period (d).
     min_period_d, max_period_d : float, optional
         Shortest and longest period (d) searched.
     fixed : bool
@@ -398,6 +408,17 @@ def plan(
     _check_draws(draws)
     if any(not 1 <= number <= 1000 for number in nights):
         raise ValueError(f"nights: must be numbers from 1 to 1000, not {list(nights)}")
+    if next is not None and not 1 <= next <= 1000:
+        raise ValueError(f"next: must be from 1 to 1000, not {next}")
+    if next is not None and nights:
+        raise ValueError("next: not with nights")
+    if next is None and (period_d is not None or alias_d is not None):
+        raise ValueError("period_d, alias_d: only with next")
+    period_d, alias_d = (_units.number("period_d", one) for one in (period_d, alias_d))
+    for name, period in (("period_d", period_d), ("alias_d", alias_d)):
+        if period is not None and not 0 < period < float("inf"):
+            raise ValueError(f"{name}: must be above 0, not {period}")
+    wanted = None if next is None else (next, period_d, alias_d)
     schedules = [configs] if isinstance(configs, (Config, Mapping, str, os.PathLike)) else configs
     if not schedules:
         raise ValueError("configs: give one at least")
@@ -405,7 +426,7 @@ def plan(
     min_period_d, max_period_d = (_units.number("period_d", one) for one in (min_period_d, max_period_d))
     options = (min_period_d, max_period_d, fixed, maps, draws, seed)
     with _folder(out, force) as (folder, scratch), shown("plan", progress) as show:
-        said = _core.plan(texts, list(nights), options, os.fspath(folder), (_threads(threads), show))
+        said = _core.plan(texts, (list(nights), wanted), options, os.fspath(folder), (_threads(threads), show))
     return Plan(folder, said, scratch)
 
 

@@ -5,7 +5,7 @@ use crate::job::{Job, attend, soon};
 use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
 use dimcmc::{
     BestOrbit, BlindSearch, BlindSearchOptions, DetectionLimits, Failure, Figure, Forecast, Format, FrequencySettings,
-    GridScan, Injected, LimitsOptions, LimitsProgress, Maps, OptimumFile, Orbit, ParaboloidRule, PlanSettings,
+    GridScan, Injected, LimitsOptions, LimitsProgress, Maps, Next, OptimumFile, Orbit, ParaboloidRule, PlanSettings,
     PlanetBox, Pool, RatePrior, Scene, Simulated, Size, StarTable, Survey, SurveySettings,
 };
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -288,23 +288,28 @@ pub fn printed(py: Python, folder: PathBuf, file: &str) -> PyResult<Option<Strin
 /// Options of `plan`: shortest and longest period, fixed; maps, draws, seed.
 type PlanOptions = (Option<f64>, Option<f64>, bool, usize, usize, u64);
 
+/// Nights to be chosen by `plan`: how many, period of the planet, another period.
+type PlanNext = Option<(usize, Option<f64>, Option<f64>)>;
+
 /// `dimcmc plan`.
 #[pyfunction]
 pub fn plan(
     py: Python,
     configs: Vec<ConfigText>,
-    nights: Vec<usize>,
+    nights: (Vec<usize>, PlanNext),
     options: PlanOptions,
     out: PathBuf,
     manner: Manner,
 ) -> PyResult<String> {
+    let (nights, next) = nights;
     let (min_period_d, max_period_d, fixed, maps, draws, seed) = options;
     let periods = FrequencySettings { min_period_d, max_period_d, oversampling: None };
     let settings = PlanSettings { maps, draws, seed, fixed };
+    let next = next.map(|(nights, period_d, other_d)| Next { nights, period_d, other_d });
     attend(py, manner.0, manner.1, move |job| {
         job.say("reading");
         let configs = configs.iter().map(ConfigText::config).collect::<Result<Vec<_>, _>>()?;
-        let forecast = Forecast::of(&configs, &nights, periods, &settings, &|what| job.say(what));
+        let forecast = Forecast::of(&configs, (&nights, next), periods, &settings, &|what| job.say(what));
         let forecast = forecast.map_err(Failure::plan)?;
         create(job, &out)?;
         forecast.write(&out).map_err(Fault::from)?;

@@ -6,7 +6,7 @@ use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::FrequencySettings;
-use crate::runs::plan::{CSV, Forecast, JSON, PlanSettings};
+use crate::runs::plan::{CSV, Forecast, JSON, Next, PlanSettings};
 use std::path::PathBuf;
 
 /// Forecast the detection limits of an observing schedule
@@ -14,11 +14,13 @@ use std::path::PathBuf;
 /// For an unobserved star the config gives schedule (or cycles), velocity bins and S/N under `observations.simulate`,
 /// and the spots by `imaging.spot_amplitude`, `spot_slope`, `spot_lifetime_d` (default values if not given). For an
 /// observed star the section `plan` gives the next nights. Sensitivities follow in closed form, marginalised over
-/// evolving-spot maps; nothing is simulated. Several configs, or several numbers of nights, are compared. Writes
+/// evolving-spot maps; nothing is simulated. Several configs, or several numbers of nights, are compared. --next chooses
+/// the nights that say most of one planet. Writes
 /// plan.json and plan.csv (period, uncertainty of K, K detected with a probability of 50 and 95 %).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc plan configs/demo.json --out runs/demo_plan\n  \
-                        dimcmc plan configs/plan.json --nights 8,12,16 --out runs/plan")]
+                        dimcmc plan configs/plan.json --nights 8,12,16 --out runs/plan\n  \
+                        dimcmc plan configs/plan.json --next 6 --period-d 4.93 --out runs/next")]
 pub struct Args {
     /// Config files (JSON), one per schedule
     #[arg(required = true)]
@@ -28,6 +30,15 @@ pub struct Args {
     /// Numbers of nights per season, one schedule each; of listed cycles, the first nights
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = nights)]
     nights: Vec<usize>,
+    /// Choose this number of the nights: those that most reduce the uncertainty of K of one planet
+    #[arg(long, value_name = "N", value_parser = nights, conflicts_with = "nights")]
+    next: Option<usize>,
+    /// Period of that planet (d); by default that of the config's planet
+    #[arg(long, value_name = "DAYS", value_parser = days, requires = "next")]
+    period_d: Option<f64>,
+    /// Choose the nights that best tell that planet from one of this period (d), an alias for example
+    #[arg(long, value_name = "DAYS", value_parser = days, requires = "next")]
+    alias_d: Option<f64>,
     /// Shortest period searched (d); by default that of `periodogram`
     #[arg(long, value_name = "DAYS")]
     min_period_d: Option<f64>,
@@ -55,6 +66,11 @@ fn nights(text: &str) -> Result<usize, String> {
     number.ok_or_else(|| "a whole number from 1 to 1000".into())
 }
 
+fn days(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|days| *days > 0.0 && days.is_finite());
+    number.ok_or_else(|| "a period above 0 (d)".into())
+}
+
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let signals = Signals::catch(RESULT)?;
@@ -64,9 +80,10 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let Args { min_period_d, max_period_d, maps, draws, seed, fixed, .. } = *args;
     let periods = FrequencySettings { min_period_d, max_period_d, oversampling: None };
     let settings = PlanSettings { maps: usize::from(maps), draws: draws as usize, seed, fixed };
+    let next = args.next.map(|nights| Next { nights, period_d: args.period_d, other_d: args.alias_d });
     let spinner = progress::bar(global, None, "reading");
     let forecast =
-        Forecast::of(&configs, &args.nights, periods, &settings, &|message| spinner.set_message(message.to_owned()));
+        Forecast::of(&configs, (&args.nights, next), periods, &settings, &|text| spinner.set_message(text.to_owned()));
     spinner.finish_and_clear();
     let forecast = forecast.map_err(Failure::plan)?;
     signals.defer();

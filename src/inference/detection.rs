@@ -188,10 +188,11 @@ impl PlanetFree {
             return PlanetFree::of(surface, at, here, frequencies, settings.search, report);
         }
         report(Stage::Known);
-        let alone = jitters(&here, surface.without_jitter(at, &here)?.as_ref());
-        let known = Known::absent(&settings.known, &here.quadratic);
+        let without_jitter = surface.without_jitter(at, &here)?;
+        let alone = jitters(&here, without_jitter.as_ref());
+        let known = Known::absent(&settings.known, &here, without_jitter.as_ref());
         known.write(&mut at.values);
-        here = surface.linearise(at, Some(&here))?;
+        here = known.whole(surface.linearise(at, Some(&here))?, &at.values);
         let known = known.present(&here.quadratic);
         let found = PlanetFree::beside(known, surface, at, here, frequencies, settings.search, report)?;
         Ok(PlanetFree { alone: Some(alone), ..found })
@@ -382,6 +383,7 @@ impl Detection {
                 at.values.set(Parameter::Vsys, vsys.value_kms);
             }
             let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
+            let here = self.known.whole(here, &at.values);
             let mut next = refined(&self.known.beside(&here.quadratic), &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();

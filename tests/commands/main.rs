@@ -19,6 +19,7 @@ mod import;
 mod init;
 mod injection;
 mod instruments;
+mod known_planets;
 mod light_curves;
 mod limits;
 mod maps;

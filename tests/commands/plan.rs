@@ -127,6 +127,68 @@ fn the_next_nights_add_to_what_has_been_observed() {
     assert!(number(&span[1]) > 11.0 && number(&span[1]) < 13.0, "from the day after the last profile on: {span:?}");
 }
 
+/// Nights are chosen for one planet or to tell two periods apart: each adds, and together they say more than as many
+/// others.
+#[test]
+fn the_best_of_the_coming_nights_are_chosen() {
+    let mut config = config(6);
+    config["plan"] = json!({ "schedule": { "nights": 12, "per_night": [1, 4], "seed": 5 }, "snr": 500 });
+    let desk = Desk::new(config);
+    let chosen = |options: &[&str], out: &str| {
+        let said = plan(&desk, &[&["--next", "4", "--out", out], options].concat());
+        (said, desk.json(&format!("{out}/plan.json"))["schedules"][0]["next"].clone())
+    };
+    let (said, next) = chosen(&["--period-d", "4.9"], "a");
+    says(&said, &["next nights, for K of a planet of 4.9 d", "4 of 12 nights: chosen ", "evenly spaced", "random"]);
+    let sigma = |of: &Value| number(&of["sigma_k_kms"]);
+    let nights = next["chosen"].as_array().unwrap();
+    let falls: Vec<f64> = std::iter::once(&next["now"]).chain(nights).map(sigma).collect();
+    assert!(falls.len() == 5 && falls.windows(2).all(|pair| pair[1] < pair[0]), "{falls:?}");
+    for others in ["even", "random"] {
+        let other = sigma(next[others].as_array().unwrap().last().unwrap());
+        assert!(falls[4] < other, "{others}: {falls:?}, {other}");
+    }
+    // the same bytes again, whatever the number of threads
+    plan(&desk, &["--next", "4", "--period-d", "4.9", "--threads", "1", "--out", "b"]);
+    assert!(desk.read("a/plan.json") == desk.read("b/plan.json"));
+    desk.succeed(&["plot", "a"]);
+    says(&desk.read("a/figures/plan_next.svg"), &["chosen", "even", "random"]);
+
+    let (said, alias) = chosen(&["--period-d", "4.9", "--alias-d", "1.26"], "c");
+    says(&said, &["to tell a planet of 4.9 d from one of 1.26 d"]);
+    // what another period takes up is lost
+    assert!(sigma(alias["chosen"].as_array().unwrap().last().unwrap()) > falls[4]);
+    says(&desk.refusal(&["plan", "config.json", "--next", "4", "--out", "d"]), &["planet", "--period-d"]);
+}
+
+/// From a place nights are as long as the star is up, and a star that is not is refused.
+#[test]
+fn a_place_says_when_a_star_is_up() {
+    let site = json!({
+        "latitude_deg": 42.94, "longitude_deg": 0.14, "right_ascension_deg": 322.8, "declination_deg": 23.3
+    });
+    let mut config = config(6);
+    config["star"]["epoch_d"] = json!(2_461_260.0);
+    config["plan"] = json!({ "schedule": { "nights": 4, "per_night": [3, 3] }, "site": site });
+    let desk = Desk::new(config);
+    plan(&desk, &["--next", "4", "--period-d", "4.9", "--out", "a"]);
+    let file = desk.json("a/plan.json");
+    let nights = file["schedules"][0]["next"]["chosen"].as_array().unwrap();
+    assert_eq!(nights.len(), 4);
+    for night in nights {
+        // between 20 and 4 UT
+        let hours = [0, 1].map(|k| 24.0 * (number(&night["span_d"][k]) + 0.5).fract());
+        assert!(hours[0] > 20.0 || hours[0] < 4.0, "{hours:?}");
+        assert!(hours[1] > 20.0 || hours[1] < 4.0, "{hours:?}");
+    }
+    desk.set("/plan/first_d", json!(2_461_470.0));
+    says(&desk.refusal(&["plan", "config.json", "--out", "b"]), &["plan.site: in none of the nights"]);
+    desk.set("/plan/first_d", json!(12.0));
+    says(&desk.refusal(&["plan", "config.json", "--out", "b"]), &["plan.site.time_zero_jd", "2457000 for BTJD"]);
+    desk.set("/plan/site/latitude_deg", json!(100));
+    says(&desk.refusal(&["plan", "config.json", "--out", "b"]), &["plan.site.latitude_deg", "-90 to 90"]);
+}
+
 #[test]
 fn what_makes_no_sense_is_refused() {
     let desk = Desk::new(config(6));

@@ -56,6 +56,12 @@ impl Schedule {
 
     /// The times (d) from the first night on, in order and to a second. None where clouds take all nights.
     pub fn times_d(&self, first_d: f64) -> Vec<f64> {
+        self.times_within(first_d, &|begin_d| Some((begin_d, self.night_hours / HOURS_A_DAY)))
+    }
+
+    /// The same, where the profiles of the night that begins at a time (d) are spread over the `window` of that night:
+    /// when it begins (d), and how long it is (d). None are taken where it has none.
+    pub fn times_within(&self, first_d: f64, window: &dyn Fn(f64) -> Option<(f64, f64)>) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(STREAM);
         let of_season = self.of_season();
@@ -65,10 +71,10 @@ impl Schedule {
             let begin_d = first_d + season as f64 * self.season_spacing_d + night as f64;
             let is_lost = rng.random::<f64>() < self.clouds;
             let profiles = rng.random_range(self.per_night[0]..=self.per_night[1]);
-            let since: Vec<f64> = (0..profiles).map(|_| self.night_hours / HOURS_A_DAY * rng.random::<f64>()).collect();
+            let shares: Vec<f64> = (0..profiles).map(|_| rng.random::<f64>()).collect();
             // drawn in any case: clouds do not change the other nights
-            if !is_lost {
-                times.extend(since.iter().map(|since| (1e5 * (begin_d + since)).round() / 1e5));
+            if let Some((from, length)) = window(begin_d).filter(|_| !is_lost) {
+                times.extend(shares.iter().map(|share| (1e5 * (from + length * share)).round() / 1e5));
             }
         }
         times.sort_by(f64::total_cmp);

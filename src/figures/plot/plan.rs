@@ -9,14 +9,59 @@ use crate::figures::drawing::{
     Align, Axis, Colour, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Scale, Stroke, range_of,
 };
 use crate::runs::origin;
-use crate::runs::plan::{AfterRecord, CSV, JSON, PlanFile};
+use crate::runs::plan::{AfterRecord, Aim, CSV, Choice, JSON, Merit, PlanFile};
 use std::path::Path;
 
 /// The figures.
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let file: PlanFile = origin::read(folder, JSON)?;
     let table = Columns::read(&folder.join(CSV))?;
-    Ok(vec![figure(&file, &table)?])
+    let next = file.best().next.as_ref().map(next);
+    Ok(std::iter::once(figure(&file, &table)?).chain(next).collect())
+}
+
+/// The standard error of K against the number of nights: the nights that are chosen, evenly spaced ones, random ones.
+fn next(choice: &Choice) -> Figure {
+    let mut figure = Figure::new("plan_next", 0.62 * PAGE_MM, 74.0);
+    let now = Some((0.0, choice.now.sigma_k_kms));
+    let chosen = choice.chosen.iter().enumerate().map(|(k, night)| ((k + 1) as f64, night.sigma_k_kms));
+    let merits = |of: &[Merit]| of.iter().map(|merit| (merit.nights as f64, merit.sigma_k_kms)).collect::<Vec<_>>();
+    let curves = [("chosen", chosen.collect()), ("even", merits(&choice.even)), ("random", merits(&choice.random))];
+    let points = |curve: &[(f64, Option<f64>)]| -> Vec<[f64; 2]> {
+        let bounded = |(nights, sigma): (f64, Option<f64>)| Some([nights, 1000.0 * sigma?]);
+        now.into_iter().chain(curve.iter().copied()).filter_map(bounded).collect()
+    };
+    let curves = curves.map(|(name, curve)| (name, points(&curve)));
+    let heights = range_of(curves.iter().flat_map(|(_, points)| points).map(|point| point[1]), Scale::Log, 0.08);
+    let nights = choice.chosen.len().max(1) as f64;
+    let (left, top) = (44.0, 24.0);
+    let panel = Panel {
+        frame: Rect { left, top, width: figure.width - left - 12.0, height: figure.height - top - 34.0 },
+        x: Axis::linear("nights", [0.0, 1.04 * nights]),
+        y: Axis::log("*σ*_{K} (m/s)", heights),
+    };
+    let mut legend = Legend::default();
+    for (k, (name, points)) in curves.iter().enumerate() {
+        let stroke = if k == 0 { Stroke::new(colour(k), 1.2) } else { Stroke::new(colour(k), 0.9).dashed() };
+        panel.line(&mut figure, name, points, stroke);
+        panel.points(&mut figure, name, points, (Marker::Disc, 3.0, colour(k)));
+        legend.add(Key::Line(stroke), name);
+    }
+    panel.frame(&mut figure, Sides::BOTH);
+    let middle = 0.5 * figure.width;
+    legend.row(&mut figure, [middle, 8.0]);
+    let of = match choice.aim {
+        Aim::Amplitude { period_d, .. } => format!("K of a planet of {period_d} d"),
+        Aim::Alias { period_d, other_d } => {
+            format!("what a planet of {period_d} d has beside an orbit of {other_d} d")
+        }
+    };
+    figure.caption = format!(
+        "Standard error of {of} against the number of coming nights, of {} that may be taken: those that are chosen, \
+        evenly spaced nights, random nights (median).",
+        choice.candidates
+    );
+    figure
 }
 
 /// Of a number, the colours repeat.

@@ -107,7 +107,10 @@ fn search(file: &PeriodogramFile) -> Chapter {
         warnings: file.warnings.clone(),
         notes,
         tables: vec![
-            (if file.blind.is_some() { "The known planet." } else { "The best orbit." }.into(), table(&["parameter", "best", "uncertainty", "injected"], orbit)),
+            (
+                if file.blind.is_some() { "The known planet." } else { "The best orbit." }.into(),
+                table(&["parameter", "best", "uncertainty", "injected"], orbit),
+            ),
             ("Peaks of the periodogram.".into(), table(&head, file.peaks.iter().map(peak).collect())),
         ],
         diagnostics: Vec::new(),

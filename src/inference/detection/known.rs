@@ -13,6 +13,7 @@ use crate::planets::mixture::{Mixture, Part};
 use crate::planets::periodogram::orbits::SIGMA_OF_UNKNOWN_PHASE;
 use crate::planets::periodogram::{CircularOrbit, Jitters, Peak};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::surface::{Linearised, WithoutJitter};
 use nalgebra::{DMatrix, DVector};
 use std::borrow::Cow;
 
@@ -53,11 +54,23 @@ pub struct Known {
 }
 
 impl Known {
-    /// The star without them: K of each with the others' free.
-    pub fn absent(ephemerides: &[Ephemeris], quadratic: &VelocityQuadratic) -> Self {
+    /// The star `here` without them: K of each with the others' free, beside the jitter of a star that has the others.
+    pub fn absent(ephemerides: &[Ephemeris], here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Self {
+        Known::of(ephemerides, |ephemeris| match (ephemerides, without_jitter) {
+            // of a single one as the star is
+            ([_, _, ..], Some(without)) => {
+                let rest = beside(others(ephemerides, ephemeris), &without.here.quadratic);
+                without.beside(&rest).as_found().quadratic.clone()
+            }
+            _ => beside(others(ephemerides, ephemeris), &here.quadratic).into_owned(),
+        })
+    }
+
+    /// K of each by velocities of a star without it.
+    fn of(ephemerides: &[Ephemeris], rest: impl Fn(&Ephemeris) -> VelocityQuadratic) -> Self {
         let planet = |ephemeris: &Ephemeris| {
-            let alone = beside(others(ephemerides, ephemeris), quadratic).amplitude(&unit(ephemeris, quadratic));
-            KnownPlanet { ephemeris: *ephemeris, alone, k: None }
+            let rest = rest(ephemeris);
+            KnownPlanet { ephemeris: *ephemeris, alone: rest.amplitude(&unit(ephemeris, &rest)), k: None }
         };
         Known { planets: ephemerides.iter().map(planet).collect() }
     }
@@ -65,6 +78,19 @@ impl Known {
     /// Writes their orbits into `values`, of the K that a star without them shows.
     pub fn write(&self, values: &mut ParameterValues) {
         self.planets.iter().for_each(|planet| planet.ephemeris.write(planet.alone[0].max(0.0), values));
+    }
+
+    /// The star `here`, at `values`, with its velocities whole: a second planet in the model has been taken out of them.
+    pub fn whole(&self, mut here: Linearised, values: &ParameterValues) -> Linearised {
+        let second = values.second.filter(|_| self.planets.iter().any(|planet| planet.ephemeris.planet == 1));
+        if let Some(second) = second.map(|second| second.eccentric()) {
+            for quadratic in [&mut here.quadratic, &mut here.held, &mut here.regularised] {
+                let velocities = quadratic.cycles.iter().map(|cycle| second.velocity_kms(*cycle));
+                let velocities = DVector::from_iterator(quadratic.len(), velocities);
+                quadratic.gradient += &quadratic.information * velocities;
+            }
+        }
+        here
     }
 
     /// The same with what the star with them says of K.
@@ -169,10 +195,7 @@ fn unit(ephemeris: &Ephemeris, quadratic: &VelocityQuadratic) -> DVector<f64> {
     DVector::from_vec(ephemeris.unit_velocities(period_d, conjunction_d, &quadratic.cycles))
 }
 
-fn beside(
-    ephemerides: impl Iterator<Item = Ephemeris>,
-    quadratic: &VelocityQuadratic,
-) -> Cow<'_, VelocityQuadratic> {
+fn beside(ephemerides: impl Iterator<Item = Ephemeris>, quadratic: &VelocityQuadratic) -> Cow<'_, VelocityQuadratic> {
     let rest = columns(ephemerides, &quadratic.cycles).and_then(|columns| quadratic.beside(&columns));
     rest.map_or(Cow::Borrowed(quadratic), Cow::Owned)
 }
@@ -263,7 +286,7 @@ mod tests {
         assert!((alone - there).abs() < 1e-12);
         assert!(k.upper95() > 0.11 && k.upper95() < 0.14, "{}", k.upper95());
         // what the error adds is left free: no orbit remains
-        let known = Known::absent(&[given], &quadratic);
+        let known = Known::of(&[given], |_| quadratic.clone());
         let rest = known.beside(&quadratic);
         let left = rest.gradient.norm() / quadratic.gradient.norm();
         assert!(left < 0.15, "{left}");
@@ -274,7 +297,9 @@ mod tests {
     fn two_known_planets_do_not_take_from_each_other() {
         let (b, c) = (ephemeris(0, 5.0, [7.0, 0.0]), ephemeris(1, 9.1, [3.0, 0.0]));
         let quadratic = quadratic(&[(b, 0.06), (c, 0.04)]);
-        let known = Known::absent(&[b, c], &quadratic).present(&quadratic);
+        let both = [b, c];
+        let rest = |of: &Ephemeris| beside(others(&both, of), &quadratic).into_owned();
+        let known = Known::of(&both, rest).present(&quadratic);
         for (planet, k) in known.planets.iter().zip([0.06, 0.04]) {
             let [mean, sd] = planet.k.unwrap().moments;
             assert!((planet.alone[0] - k).abs() < 1e-12 && (mean - k).abs() < 1e-9 && sd > 0.012, "{planet:?}");

@@ -100,6 +100,15 @@ pub fn at(quadratic: &VelocityQuadratic, frequency: f64) -> Trial {
     scan(quadratic, &[frequency])[0]
 }
 
+/// Information on (a, b) of an orbit at one frequency with the amplitudes of one at another left free; `None` where those
+/// are not bounded.
+pub fn between(quadratic: &VelocityQuadratic, frequency: f64, other: f64) -> Option<Matrix2<f64>> {
+    let x = design(&quadratic.cycles, &[frequency, other]);
+    let a = x.tr_mul(&(&quadratic.information * &x));
+    let [own, across, others] = [(0, 0), (0, 2), (2, 2)].map(|at| a.fixed_view::<2, 2>(at.0, at.1).into_owned());
+    Some(own - across * others.try_inverse()? * across.transpose())
+}
+
 /// Smallest and largest eigenvalue of a symmetric matrix; NaN if it holds one.
 pub(super) fn eigenvalues(m: &Matrix2<f64>) -> (f64, f64) {
     let (mean, half) = (0.5 * m.trace(), 0.5 * (m[(0, 0)] - m[(1, 1)]));

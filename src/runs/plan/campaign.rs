@@ -150,7 +150,7 @@ impl Campaign {
     ) -> Result<Self, CampaignError> {
         let settings = with_nights(config, wanted)?.settings()?;
         let mut planned = match (&settings.sets[0].source, &settings.plan, taken) {
-            (_, Some(plan), Some(taken)) => next(plan, &taken.observations),
+            (_, Some(plan), Some(taken)) => next(plan, &taken.observations, own)?,
             (ObservationSource::Simulate(simulation), ..) => {
                 let mut observations = simulation.observe(&settings.sets[0].star);
                 let inflation = simulation.correlated_bins.sqrt();
@@ -274,6 +274,7 @@ fn usual(known: Known) -> Assumed {
 fn schedule_of(config: &Config) -> Option<&'static str> {
     const PLACES: [&str; 2] = ["plan.schedule", "observations.simulate.schedule"];
     match config.get("plan") {
+        Some(plan) if plan.get("times_d").is_some_and(|times| !times.is_null()) => None,
         Some(_) => Some(PLACES[0]),
         None => config.get(PLACES[1]).map(|_| PLACES[1]),
     }
@@ -295,15 +296,34 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
 
 /// Planned profiles like those that have been taken: bins of the last of them, and a median error where no
 /// signal-to-noise ratio is planned.
-fn next(plan: &PlanSection, taken: &Observations) -> Observations {
+fn next(plan: &PlanSection, taken: &Observations, settings: &Settings) -> Result<Observations, ConfigError> {
     let last_d = taken.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
     let first_d = plan.first_d.unwrap_or(last_d.floor() + 1.0);
     let usual = median(taken.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect());
     let sigma = plan.snr.map_or(usual, f64::recip);
     let like = &taken.profiles[taken.profiles.len() - 1];
     let profile = |time_d: f64| Profile { time_d, sigma: vec![sigma; like.sigma.len()], ..like.clone() };
-    let profiles = plan.schedule.times_d(first_d).into_iter().map(profile).collect();
-    Observations { profiles }
+    let times_d = match (&plan.times_d, &plan.site) {
+        (Some(listed), _) => listed.clone(),
+        (None, None) => plan.schedule.times_d(first_d),
+        (None, Some(site)) if !site.has_date(first_d) => {
+            let problem = format!(
+                "time {first_d} is no Julian date from 1900 to 2100: give the Julian date of time 0, as 2400000.5 for \
+                MJD or 2457000 for BTJD"
+            );
+            return Err(settings.fault("plan.site.time_zero_jd", &problem));
+        }
+        (None, Some(site)) => plan.schedule.times_within(first_d, &|begin_d| {
+            let [from, to] = site.window_d(begin_d)?;
+            Some((from, to - from))
+        }),
+    };
+    if times_d.is_empty() {
+        let problem = "in none of the nights is the star high enough while it is dark: another first_d, or a lower \
+            min_altitude_deg";
+        return Err(settings.fault("plan.site", problem));
+    }
+    Ok(Observations { profiles: times_d.into_iter().map(profile).collect() })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -1,12 +1,12 @@
 //! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
 
-use super::{Campaign, Expected, Outlook, PlanSettings, SpotsSource};
+use super::{Aim, Campaign, Choice, Expected, Outlook, PlanSettings, SpotsSource};
 use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::data::io::saved::Saved;
 use crate::numerics::text::{aligned, escaped};
-use crate::planets::verdict::CANDIDATE_FAP;
+use crate::planets::verdict::{CANDIDATE_FAP, speed};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -77,6 +77,9 @@ pub struct ScheduleRecord {
     /// Strong peaks of the window function, from high to low: orbits of frequency f are hard to tell from those of f
     /// plus or minus one of these.
     pub window: Vec<WindowRecord>,
+    /// The nights to be taken, where they were to be chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next: Option<Choice>,
 }
 
 /// The spots that are integrated out.
@@ -194,6 +197,10 @@ impl PlanFile {
         if several {
             text += &format!("best: {}\n\n", escaped(&best.name));
         }
+        if let Some(next) = &best.next {
+            text += &next.table();
+            text += "\n";
+        }
         text += &best.table();
         text += "\n";
         for sentence in best.sentences(self.false_alarm_probability) {
@@ -264,6 +271,7 @@ impl ScheduleRecord {
             after: outlooks.iter().map(after).collect(),
             periods,
             window,
+            next: None,
         }
     }
 
@@ -341,6 +349,38 @@ impl ExpectedRecord {
         let period_d = (1e9 * rotation_period_d * porb_over_prot).round() / 1e9;
         let imitated = imitation.map(|imitation| imitation.words(rotation_period_d));
         ExpectedRecord { period_d, porb_over_prot, sigma_k_kms, k50_kms, k95_kms, imitated }
+    }
+}
+
+impl Choice {
+    /// The nights, what each adds, and what others would.
+    fn table(&self) -> String {
+        let sigma = |kms: Option<f64>| kms.map_or_else(|| "not bounded".into(), |kms| speed(kms, 0.1 * kms));
+        let head = ["night", "first time (d)", "profiles", "sigma_K with it"].map(str::to_owned).to_vec();
+        let row = |(k, night): (usize, &super::ChosenNight)| {
+            let first = format!("{:.2}", night.span_d[0]);
+            vec![(k + 1).to_string(), first, night.profiles.to_string(), sigma(night.sigma_k_kms)]
+        };
+        let nights = self.chosen.len();
+        let last = |of: &[super::Merit]| sigma(of.last().and_then(|merit| merit.sigma_k_kms));
+        let now = sigma(self.now.sigma_k_kms);
+        let mut text = match &self.aim {
+            Aim::Amplitude { period_d, .. } => {
+                format!("next nights, for K of a planet of {period_d} d: sigma_K is {now} now\n")
+            }
+            Aim::Alias { period_d, other_d } => format!(
+                "next nights, to tell a planet of {period_d} d from one of {other_d} d: sigma_K of what the other \
+                period does not take up is {now} now\n"
+            ),
+        };
+        text += &aligned(&std::iter::once(head).chain(self.chosen.iter().enumerate().map(row)).collect::<Vec<_>>());
+        text + &format!(
+            "{nights} of {} nights: chosen {}, evenly spaced {}, random {} (median)\n",
+            self.candidates,
+            sigma(self.chosen.last().and_then(|night| night.sigma_k_kms)),
+            last(&self.even),
+            last(&self.random)
+        )
     }
 }
 

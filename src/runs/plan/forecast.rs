@@ -1,8 +1,13 @@
 //! A whole plan: the schedules of several configs, compared.
 
-use super::{Campaign, CampaignError, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d};
-use crate::data::config::Config;
+use super::choice::choose;
+use super::{
+    Aim, Campaign, CampaignError, Choice, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d,
+};
+use crate::data::config::{Config, ConfigError};
+use crate::data::ephemeris::ephemerides;
 use crate::data::io::atomic::WriteError;
+use crate::model::Parameter;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{FrequencyError, FrequencySettings};
 use std::path::Path;
@@ -11,6 +16,38 @@ use std::path::Path;
 pub struct Forecast {
     campaigns: Vec<(Campaign, Vec<Outlook>)>,
     file: PlanFile,
+}
+
+/// Nights that are to be chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Next {
+    /// How many.
+    pub nights: usize,
+    /// Period of the planet (d); that of the config, if it is not given.
+    pub period_d: Option<f64>,
+    /// Another period (d) that it is to be told from.
+    pub other_d: Option<f64>,
+}
+
+impl Next {
+    /// What the nights of a campaign are chosen for.
+    fn aim(&self, campaign: &Campaign) -> Result<Aim, ConfigError> {
+        let settings = &campaign.settings;
+        let known = ephemerides(settings).into_iter().find(|known| known.planet == 0);
+        let prot = settings.star.rotation_period_d;
+        let of_config = || {
+            let own = settings.values[Parameter::K] > 0.0;
+            known.map(|known| known.period_d[0]).or(own.then_some(prot * settings.values[Parameter::PorbOverProt]))
+        };
+        let Some(period_d) = self.period_d.or_else(of_config) else {
+            let problem = "no planet there, and --next chooses nights for one: give its period by --period-d";
+            return Err(settings.fault("planet", problem));
+        };
+        Ok(match self.other_d {
+            Some(other_d) => Aim::Alias { period_d, other_d },
+            None => Aim::Amplitude { period_d, ephemeris: known.filter(|_| self.period_d.is_none()) },
+        })
+    }
 }
 
 /// Why there is no forecast.
@@ -33,14 +70,15 @@ pub enum ForecastError {
 }
 
 impl Forecast {
-    /// Of the schedules in `configs`, one at least; of each as many as there are numbers of `nights`, if any are given.
+    /// Of the schedules in `configs`, one at least; of each as many as there are numbers of `nights`, if any are given;
+    /// of each the `next` nights, where that is asked for.
     /// `report` is told what is under way.
     ///
     /// # Errors
     /// [`ForecastError`].
     pub fn of(
         configs: &[Config],
-        nights: &[usize],
+        (nights, next): (&[usize], Option<Next>),
         periods: FrequencySettings,
         settings: &PlanSettings,
         report: &dyn Fn(&str),
@@ -68,7 +106,14 @@ impl Forecast {
             Ok::<_, ForecastError>((campaign, outlooks))
         };
         let campaigns = campaigns.into_iter().map(one).collect::<Result<Vec<_>, _>>()?;
-        let file = PlanFile::new(&looked(&campaigns), range, &compared, settings);
+        let mut file = PlanFile::new(&looked(&campaigns), range, &compared, settings);
+        if let Some(next) = next {
+            for ((campaign, _), schedule) in campaigns.iter().zip(&mut file.schedules) {
+                let aim = next.aim(campaign).map_err(CampaignError::from)?;
+                let choice: Choice = choose(campaign, next.nights, &aim, settings, report)?;
+                schedule.next = Some(choice);
+            }
+        }
         Ok(Forecast { campaigns, file })
     }
 

@@ -7,15 +7,18 @@
 //! 2. The information that these hold of the orbit's velocities, spots integrated out (`surface::evolving_map`).
 //! 3. Errors, false alarms and limits follow from it as for observed profiles (`planets::periodogram`). Of what differs
 //!    from map to map the median is taken.
+//! 4. On request the nights are [chosen](Choice) that say most of one planet.
 
 mod campaign;
+mod choice;
 mod file;
 mod forecast;
 mod outlook;
 
 pub use campaign::{Campaign, CampaignError, SpotsSource};
+pub use choice::{Aim, Choice, ChosenNight, Merit};
 pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
-pub use forecast::{Forecast, ForecastError};
+pub use forecast::{Forecast, ForecastError, Next};
 pub use outlook::{Expected, Outlook};
 
 use crate::field::FieldError;

@@ -6,7 +6,7 @@ use super::checks::{
 use super::parameters::check_value;
 use crate::data::config::error::Fault;
 use crate::data::config::written::{PlanSection, SimulateSection, VelocitySection};
-use crate::data::simulate::{RandomSpots, Schedule, Simulation};
+use crate::data::simulate::{RandomSpots, Schedule, Simulation, Site};
 use crate::model::{Clock, Elements, Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
 use crate::surface::nuisances::LineAndContinuum;
@@ -180,6 +180,15 @@ pub(super) fn check_plan(plan: &PlanSection) -> Result<(), Fault> {
     scheduled(&plan.schedule, "plan.schedule", 0.0)?;
     if let Some(first_d) = plan.first_d {
         check_size("plan.first_d", first_d, most::TIME)?;
+    }
+    if let Some(times_d) = &plan.times_d {
+        if times_d.is_empty() {
+            return Err(Fault::new("plan.times_d", "is empty, give one time at least"));
+        }
+        times_d.iter().try_for_each(|time_d| check_size("plan.times_d", *time_d, most::TIME))?;
+    }
+    if let Some((key, problem)) = plan.site.as_ref().and_then(Site::fault) {
+        return Err(Fault::new(format!("plan.site.{key}"), problem));
     }
     plan.snr.map_or(Ok(()), |snr| positive("plan.snr", snr))
 }

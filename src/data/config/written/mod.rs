@@ -23,7 +23,7 @@ pub use star::{
     USUAL_WAVELENGTH_NM, VelocityDrift,
 };
 
-use crate::data::simulate::Schedule;
+use crate::data::simulate::{Schedule, Site};
 use crate::model::{Parameter, PriorKind};
 use crate::sampling::ensemble::SamplerSettings;
 use schemars::JsonSchema;
@@ -121,6 +121,9 @@ pub struct PlanSection {
     /// When they are taken.
     #[serde(default)]
     pub schedule: Schedule,
+    /// Times of the profiles (d), on the time scale of the observations, in place of `schedule`, `first_d` and `site`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub times_d: Option<Vec<f64>>,
     /// Time of the first night (d), on the time scale of the observations; the day after the last profile, if not
     /// given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -128,6 +131,11 @@ pub struct PlanSection {
     /// Signal-to-noise ratio of each bin, above 0; that of the observed profiles, if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snr: Option<f64>,
+    /// From where: profiles are spread over the time in which the star is observable, in place of
+    /// `schedule.night_hours`, and nights in which it is not are left out. Times must then be Julian dates, or such less
+    /// `time_zero_jd`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site: Option<Site>,
 }
 
 /// The likelihood grid of `dimcmc grid`: ln L of the maps, without priors. Parameters without an axis are fixed at

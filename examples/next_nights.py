@@ -1,0 +1,157 @@
+"""Are the nights that `plan --next` chooses better than others?
+
+    python3 examples/next_nights.py --program target/release/dimcmc
+    python3 examples/next_nights.py --table
+
+Each star has 14 evolving spots, drawn as pixels by `dimcmc simulate`, and no planet. Eight nights are taken, 14 may
+follow, with one to four profiles each. `dimcmc plan --next 6` knows the profiles that are taken and the times of the
+others; it chooses for a planet of a period drawn for each star. Then the profiles of the nights it chose, of six evenly
+spaced and of six random ones are searched by `dimcmc periodogram` with those taken before, and sigma_K at that period
+is compared. One line per star goes to results/calibration/next-nights.csv; the second command writes the table under
+the head of results/plan.md.
+"""
+
+import argparse
+import json
+import math
+import random
+import subprocess
+from pathlib import Path
+
+import calibration_table
+
+PROT_D, INCLINATION, FIRST_D = 2.741, 55.0, 2459002.0
+TAKEN, CANDIDATES, CHOSEN = 8, 14, 6
+PERIODS_D = (3.0, 12.0)
+WAYS = ("chosen", "even", "random")
+COLUMNS = "seed period_d forecast_now forecast chosen even random error".split()
+
+
+def simulation(seed):
+    return {
+        "star": {
+            "rotation_period_d": PROT_D,
+            "epoch_d": FIRST_D,
+            "inclination_deg": INCLINATION,
+            "vsini_kms": 30.5,
+            "photosphere_k": 4250.0,
+            "spot_k": 3450.0,
+            "wavelength_nm": 640.0,
+            "line": {"shape": "gaussian", "sigma_kms": 3.5, "equivalent_width_kms": 6.0},
+        },
+        "instrument": {"resolving_power": 65000.0},
+        "observations": {
+            "simulate": {
+                "random_spots": {"number": 14, "lifetime_d": 20, "seed": 2000 + seed},
+                "schedule": {"nights": TAKEN + CANDIDATES, "per_night": [1, 4], "night_hours": 8, "seed": seed},
+                "velocity_kms": {"min": -45, "max": 45, "step": 1.8},
+                "snr": 1500,
+                "seed": seed,
+            }
+        },
+    }
+
+
+def one(seed, args):
+    rng = random.Random(seed)
+    folder = args.work / str(seed)
+    folder.mkdir(parents=True, exist_ok=True)
+    period_d = PERIODS_D[0] * (PERIODS_D[1] / PERIODS_D[0]) ** rng.random()
+    line = {"seed": seed, "period_d": period_d}
+
+    def run(*words):
+        subprocess.run([args.program, *map(str, words)], cwd=folder, check=True, capture_output=True, text=True)
+
+    try:
+        (folder / "simulation.json").write_text(json.dumps(simulation(seed)))
+        run("simulate", "simulation.json", "--out", "data", "--force")
+        lines = (folder / "data" / "observations.txt").read_text().split("\n")
+        lines = [text for text in lines if text and not text.startswith("#")]
+        nights = {}
+        for text in lines:
+            nights.setdefault(math.floor(float(text.split()[1]) - FIRST_D), []).append(text)
+        nights = [nights[number] for number in sorted(nights)]
+        taken, later = nights[:TAKEN], nights[TAKEN:]
+
+        def listed(name, nights):
+            (folder / "data" / name).write_text("".join(f"{text}\n" for night in nights for text in night))
+
+        listed("taken.txt", taken)
+        known = ("--rotation-period", PROT_D, "--inclination", INCLINATION)
+        run("init", "data/taken.txt", *known, "--out", "star.json", "--force")
+        config = json.loads((folder / "star.json").read_text())
+        times = [float(text.split()[1]) for night in later for text in night]
+        (folder / "plan.json").write_text(json.dumps(config | {"plan": {"times_d": times}}))
+        run("plan", "plan.json", "--next", CHOSEN, "--period-d", period_d, "--draws", 1000, "--out", "plan", "--force")
+        forecast = json.loads((folder / "plan" / "plan.json").read_text())["schedules"][0]["next"]
+        line["forecast_now"] = forecast["now"]["sigma_k_kms"]
+        line["forecast"] = forecast["chosen"][-1]["sigma_k_kms"]
+        begins = [night["span_d"][0] for night in forecast["chosen"]]
+        begin = lambda night: min(float(text.split()[1]) for text in night)
+        count = len(later)
+        ways = {
+            "chosen": [night for night in later if any(abs(begin(night) - time) < 1e-6 for time in begins)],
+            "even": [later[(2 * k + 1) * count // (2 * CHOSEN)] for k in range(CHOSEN)],
+            "random": rng.sample(later, CHOSEN),
+        }
+        for way, nights in ways.items():
+            assert len(nights) == CHOSEN
+            listed(f"{way}.txt", taken + nights)
+            config["observations"]["path"] = f"data/{way}.txt"
+            (folder / f"{way}.json").write_text(json.dumps(config))
+            run("periodogram", f"{way}.json", "--draws", 1000, "--out", way, "--force")
+            rows = [row.split(",") for row in (folder / way / "periodogram.csv").read_text().split("\n") if row]
+            at, sigma = (rows[0].index(name) for name in ("period_d", "sigma_k_kms"))
+            nearest = min(rows[1:], key=lambda row: abs(math.log(float(row[at]) / period_d)))
+            line[way] = float(nearest[sigma])
+    except subprocess.CalledProcessError as failure:
+        line["error"] = failure.stderr.strip().splitlines()[-1]
+    return line
+
+
+def table(args):
+    number = calibration_table.number
+    rows = [{name: number(value) for name, value in row.items()} for row in calibration_table.read(args.csv)]
+    good = [row for row in rows if row["error"] == ""]
+    median = lambda values: sorted(values)[len(values) // 2]
+    lines = []
+    for way in WAYS:
+        sigma = f"{1000 * median([row[way] for row in good]):.1f}"
+        ratio = f"{median([row[way] / row['chosen'] for row in good]):.2f}"
+        beaten = "" if way == "chosen" else sum(row["chosen"] < row[way] for row in good)
+        lines.append([way, sigma, ratio, beaten])
+    head = "six nights; median sigma_K (m/s); over that of the chosen; stars on which the chosen are better"
+    best = sum(row["chosen"] < min(row["even"], row["random"]) for row in good)
+    ratio = median([row["chosen"] / row["forecast"] for row in good])
+    text = calibration_table.table(head.split("; "), lines) + (
+        f"\nOn {best} of {len(good)} stars the nights chosen give a smaller sigma_K than both others. What is achieved "
+        f"is {ratio:.2f} of the forecast (median).\n"
+    )
+    text += "".join(f"- {row['seed']:.0f}: {row['error']}\n" for row in rows if row["error"] != "")
+    mark, title = "<!-- next nights -->\n", "## The next nights\n"
+    note = args.out.read_text()
+    before = note.partition(mark)[0] if mark in note else f"{note.rstrip()}\n\n{title}\n"
+    args.out.write_text(f"{before}{mark}\n{text.rstrip()}\n")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", help="dimcmc")
+    parser.add_argument("--first", type=int, default=1, help="first seed")
+    parser.add_argument("--stars", type=int, default=30)
+    parser.add_argument("--work", type=Path, default=Path("target/next-nights"), help="folder of the stars")
+    parser.add_argument("--csv", type=Path, default=Path("results/calibration/next-nights.csv"))
+    parser.add_argument("--out", type=Path, default=Path("results/plan.md"))
+    parser.add_argument("--table", action="store_true", help="write the table of the lines so far")
+    args = parser.parse_args()
+    if args.table:
+        table(args)
+    elif args.program:
+        args.program = str(Path(args.program).resolve())
+        args.work.mkdir(parents=True, exist_ok=True)
+        done = {row["seed"] for row in calibration_table.resumed(args.csv)}
+        for seed in range(args.first, args.first + args.stars):
+            if str(seed) not in done:
+                calibration_table.append(args.csv, COLUMNS, one(seed, args))
+    else:
+        parser.error("--program, or --table")

@@ -1,0 +1,226 @@
+//! Which of the coming nights to take: those that say most of one planet, or of which of two periods is its.
+//!
+//! Nights are taken one by one, each time the one that helps most beside those that are taken. What profiles say of an
+//! orbit is known before there are any: the information of their velocities, spots integrated out
+//! (`surface::planned`). Means over maps, where it depends on them.
+
+use super::{Campaign, PlanError, PlanSettings};
+use crate::field::FieldError;
+use crate::model::Ephemeris;
+use crate::planets::periodogram::orbits::{at, between};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::surface::expansion::nuisances;
+use crate::surface::planned::Planned;
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Maps over which information is averaged, at most: it hardly depends on them.
+const MAPS: usize = 3;
+
+/// Random choices that are compared with the best, by their median.
+const RANDOM: usize = 5;
+
+/// Stream of the random numbers of random choices.
+const STREAM: u64 = 6;
+
+/// What nights are chosen for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "for")]
+pub enum Aim {
+    /// The smallest standard error of K of a planet of this period.
+    Amplitude {
+        /// Its period (d).
+        period_d: f64,
+        /// Its ephemeris, where it is known; any phase otherwise.
+        #[serde(skip)]
+        ephemeris: Option<Ephemeris>,
+    },
+    /// Telling a planet of this period from one of another, any phases.
+    Alias {
+        /// Its period (d).
+        period_d: f64,
+        /// The other one (d).
+        other_d: f64,
+    },
+}
+
+/// What some nights come to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Merit {
+    /// Number of coming nights taken.
+    pub nights: usize,
+    /// Standard error of K (km/s); of two periods, of the part of the orbit that the other period does not take up.
+    /// Null where it is not bounded.
+    pub sigma_k_kms: Option<f64>,
+}
+
+/// A night that is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChosenNight {
+    /// First and last time (d).
+    pub span_d: [f64; 2],
+    /// Its profiles.
+    pub profiles: usize,
+    /// The standard error of K (km/s) with it and those chosen before.
+    pub sigma_k_kms: Option<f64>,
+}
+
+/// Nights chosen among those that may be taken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Choice {
+    /// For what.
+    #[serde(flatten)]
+    pub aim: Aim,
+    /// Nights that they were chosen from.
+    pub candidates: usize,
+    /// With no coming night.
+    pub now: Merit,
+    /// The nights, the most valuable first.
+    pub chosen: Vec<ChosenNight>,
+    /// As many nights, evenly spaced.
+    pub even: Vec<Merit>,
+    /// As many at random: medians.
+    pub random: Vec<Merit>,
+}
+
+/// What the profiles of some nights say.
+struct Weighed<'a> {
+    planned: Planned<'a>,
+    maps: Vec<DMatrix<f64>>,
+    campaign: &'a Campaign,
+    aim: &'a Aim,
+}
+
+impl Weighed<'_> {
+    /// Standard error of K with these coming nights; infinite where it is not bounded.
+    fn sigma(&self, nights: &[usize]) -> Result<f64, FieldError> {
+        let mut part: Vec<usize> = (0..self.campaign.before()).collect();
+        part.extend(nights.iter().flat_map(|night| self.campaign.nights[*night].iter().copied()));
+        part.sort_unstable();
+        if part.is_empty() {
+            return Ok(f64::INFINITY);
+        }
+        let mut variances = Vec::new();
+        for maps in &self.maps {
+            let quadratic = &self.planned.velocities(maps, std::slice::from_ref(&part))?[0];
+            variances.push(self.aim.variance(quadratic, self.campaign.imager.star.rotation_period_d));
+        }
+        Ok((variances.iter().sum::<f64>() / variances.len() as f64).sqrt())
+    }
+
+    fn sigmas(&self, all: &[Vec<usize>]) -> Result<Vec<f64>, FieldError> {
+        all.par_iter().map(|nights| self.sigma(nights)).collect()
+    }
+}
+
+impl Aim {
+    /// Variance of K (km^2/s^2), averaged over phases where these are not known; infinite where it is not bounded.
+    fn variance(&self, quadratic: &VelocityQuadratic, rotation_period_d: f64) -> f64 {
+        let found = match self {
+            Aim::Amplitude { period_d, ephemeris: Some(known) } => {
+                let unit = known.unit_velocities(*period_d, known.conjunction_d[0], &quadratic.cycles);
+                Some(quadratic.amplitude(&DVector::from_vec(unit))[1].powi(2))
+            }
+            Aim::Amplitude { period_d, ephemeris: None } => {
+                let trial = at(quadratic, rotation_period_d / period_d);
+                let covariance = trial.orbit.and_then(|_| trial.information.try_inverse());
+                covariance.map(|covariance| 0.5 * covariance.trace())
+            }
+            Aim::Alias { period_d, other_d } => {
+                let rest = between(quadratic, rotation_period_d / period_d, rotation_period_d / other_d);
+                rest.map(|information| 2.0 / information.trace())
+            }
+        };
+        found.filter(|variance| *variance > 0.0).unwrap_or(f64::INFINITY)
+    }
+}
+
+/// `count` nights of the `campaign`, or all where there are fewer. `report` is told how far it is.
+///
+/// # Errors
+/// [`PlanError::Field`].
+pub fn choose(
+    campaign: &Campaign,
+    count: usize,
+    aim: &Aim,
+    settings: &PlanSettings,
+    report: &dyn Fn(&str),
+) -> Result<Choice, PlanError> {
+    let field = |source| PlanError::Field { name: campaign.name.clone(), source };
+    let nuisances = if settings.fixed { Vec::new() } else { nuisances(&campaign.settings.free) };
+    let planned = Planned::new(
+        &campaign.imager,
+        campaign.settings.values,
+        campaign.assumed,
+        &nuisances,
+        campaign.taken.as_deref(),
+    );
+    let maps = match settings.maps {
+        0 => vec![planned.mean_maps()],
+        many => (0..many.min(MAPS))
+            .map(|k| planned.drawn_maps(settings.seed.wrapping_add(k as u64)))
+            .collect::<Result<_, _>>()
+            .map_err(field)?,
+    };
+    let weighed = Weighed { planned, maps, campaign, aim };
+    let candidates = campaign.nights.len();
+    let count = count.min(candidates);
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut nights = Vec::new();
+    for k in 0..count {
+        report(&format!("{}: night {} of {count}", campaign.name, k + 1));
+        let left: Vec<usize> = (0..candidates).filter(|night| !chosen.contains(night)).collect();
+        let with = |night: &usize| chosen.iter().copied().chain([*night]).collect::<Vec<_>>();
+        let sigmas = weighed.sigmas(&left.iter().map(with).collect::<Vec<_>>()).map_err(field)?;
+        let best = (0..left.len()).min_by(|a, b| sigmas[*a].total_cmp(&sigmas[*b])).unwrap_or(0);
+        chosen.push(left[best]);
+        nights.push(campaign.chosen(left[best], bounded(sigmas[best])));
+    }
+    report(&format!("{}: even and random nights", campaign.name));
+    let evenly = |n: usize| (0..n).map(|k| (2 * k + 1) * candidates / (2 * n)).collect::<Vec<_>>();
+    let even = weighed.sigmas(&(1..=count).map(evenly).collect::<Vec<_>>()).map_err(field)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    rng.set_stream(STREAM);
+    let mut draws: Vec<Vec<usize>> = Vec::new();
+    for _ in 0..RANDOM {
+        let mut order: Vec<usize> = (0..candidates).collect();
+        order.shuffle(&mut rng);
+        draws.extend((1..=count).map(|n| order[..n].to_vec()));
+    }
+    let at_random = weighed.sigmas(&draws).map_err(field)?;
+    let median = |n: usize| {
+        let mut all: Vec<f64> = at_random.iter().skip(n).step_by(count).copied().collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    };
+    let merits = |sigmas: Vec<f64>| {
+        let merit = |(k, sigma): (usize, f64)| Merit { nights: k + 1, sigma_k_kms: bounded(sigma) };
+        sigmas.into_iter().enumerate().map(merit).collect()
+    };
+    let now = Merit { nights: 0, sigma_k_kms: bounded(weighed.sigma(&[]).map_err(field)?) };
+    Ok(Choice {
+        aim: aim.clone(),
+        candidates,
+        now,
+        chosen: nights,
+        even: merits(even),
+        random: merits((0..count).map(median).collect()),
+    })
+}
+
+fn bounded(sigma: f64) -> Option<f64> {
+    sigma.is_finite().then_some(sigma)
+}
+
+impl Campaign {
+    fn chosen(&self, night: usize, sigma_k_kms: Option<f64>) -> ChosenNight {
+        let times = self.imager.times_d();
+        let of = self.nights[night].iter().map(|k| times[*k]);
+        let [first, last] = of.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], t| [a.min(t), b.max(t)]);
+        ChosenNight { span_d: [first, last], profiles: self.nights[night].len(), sigma_k_kms }
+    }
+}

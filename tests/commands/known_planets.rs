@@ -1,0 +1,82 @@
+//! Planets of known ephemeris: each judged beside the other, tables and figures theirs, a third one searched for beside
+//! them.
+
+use crate::desk::{Desk, says, star};
+use serde_json::{Value, json};
+
+/// Periods and conjunctions (d), semi-amplitudes (km/s).
+const PERIODS_D: [f64; 2] = [4.9, 8.3];
+const CONJUNCTIONS_D: [f64; 2] = [1.2, 5.1];
+const K_KMS: [f64; 2] = [0.30, 0.20];
+
+/// A star whose spots change, with two planets.
+fn config() -> Value {
+    let mut star = star();
+    star["mass_msun"] = json!(0.9);
+    let normal = |mean: f64, sd: f64| json!({ "prior": "normal", "mean": mean, "sd": sd });
+    json!({
+        "star": star,
+        "planet": {
+            "k_kms": K_KMS[0], "period_d": PERIODS_D[0], "t_conjunction_d": CONJUNCTIONS_D[0],
+            "k2_kms": K_KMS[1], "period2_d": PERIODS_D[1], "t_conjunction2_d": CONJUNCTIONS_D[1]
+        },
+        "observations": { "simulate": {
+            "random_spots": { "number": 10, "lifetime_d": 15, "seed": 2 },
+            "schedule": { "nights": 14, "per_night": [2, 2], "night_hours": 7.0, "seed": 3 },
+            "velocity_kms": { "min": -30, "max": 30, "step": 3.0 }, "snr": 800, "seed": 4, "pixels": 1000
+        } },
+        "imaging": { "pixels": 300 },
+        "parameters": {
+            "k_kms": { "prior": "uniform", "min": 0, "max": 2 },
+            "period_d": normal(PERIODS_D[0], 0.001), "t_conjunction_d": normal(CONJUNCTIONS_D[0], 0.01),
+            "k2_kms": { "prior": "uniform", "min": 0, "max": 2 },
+            "period2_d": normal(PERIODS_D[1], 0.001), "t_conjunction2_d": normal(CONJUNCTIONS_D[1], 0.01),
+            "vsys_kms": { "prior": "uniform", "min": -1, "max": 1 }
+        }
+    })
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+#[test]
+fn two_known_planets_are_judged_together_and_a_third_is_found_beside_them() {
+    let desk = Desk::new(config());
+    let said = desk.succeed(&["periodogram", "config.json", "--draws", "1000", "--out", "search"]);
+    says(&said, &["Known planet 1: detected", "Known planet 2: detected", "Blind search: No significant signal"]);
+    says(&said, &["planet 1", "planet 2", "msini_mjup", "blind search beside the known planets:"]);
+    let file = desk.json("search/periodogram.json");
+    for (k, planet) in file["known_planets"].as_array().unwrap().iter().enumerate() {
+        let [k_kms, sigma] = ["k_kms", "sigma_k_kms"].map(|key| number(&planet["orbit"][key]));
+        assert!((k_kms - K_KMS[k]).abs() < 3.0 * sigma && sigma < 0.05, "{k_kms} +- {sigma}");
+        assert_eq!(
+            (planet["planet"].as_u64(), &planet["orbit"]["period_d"]),
+            (Some(k as u64 + 1), &json!(PERIODS_D[k]))
+        );
+    }
+    assert_eq!(file["best"], file["known_planets"][0]["orbit"]);
+    assert_eq!(file["verdict"]["known"]["planet"], 1);
+    assert!(number(&file["blind"]["false_alarm_probability"]) > 0.01);
+    // nights are those of the known planet
+    for night in file["robustness"]["without_night"].as_array().unwrap() {
+        assert_eq!(night["phi"], file["best"]["phi"]);
+    }
+    desk.succeed(&["plot", "search"]);
+    says(&desk.read("search/figures/rv.svg"), &["known planet"]);
+    desk.succeed(&["report", "search"]);
+    says(&desk.read("search/report.html"), &["Known planet 2: detected", "The known planet."]);
+
+    // one known alone: the search beside it finds the other
+    let mut alone = config();
+    alone["observations"]["simulate"]["truth"] = alone["planet"].clone();
+    for section in ["planet", "parameters"] {
+        let section = alone[section].as_object_mut().unwrap();
+        section.retain(|key, _| !["k2_kms", "period2_d", "t_conjunction2_d"].contains(&key.as_str()));
+    }
+    let one = Desk::new(alone);
+    let said = one.succeed(&["periodogram", "config.json", "--draws", "1000", "--out", "search"]);
+    says(&said, &["Known planet: detected", "Blind search: ", "blind search beside the known planet:"]);
+    let found = number(&one.json("search/periodogram.json")["peaks"][0]["period_d"]);
+    assert!((1.0 / found - 1.0 / PERIODS_D[1]).abs() < 0.5 / 13.0, "the second planet: {found}");
+}
