@@ -1,4 +1,4 @@
-"""Two transiting planets in one star, and a third that nobody knows of: are their K right, is it found as `limits` says?
+"""Two transiting planets of one star, and a third that nobody knows of: are their K right, is it found?
 
     python3 examples/known_planets.py --program target/release/dimcmc
     python3 examples/known_planets.py --table
@@ -130,7 +130,8 @@ def one(seed, args):
         found = json.loads((folder / "search" / "periodogram.json").read_text())
         for number, planet in enumerate(found["known_planets"], 1):
             line |= {f"{key[:-4]}{number}_kms": planet["orbit"][key] for key in ("k_kms", "sigma_k_kms")}
-        line |= {"false_alarm": found["false_alarm"]["probability"], "jitter_kms": found["field"]["velocity_jitter_kms"]}
+        line["false_alarm"] = found["false_alarm"]["probability"]
+        line["jitter_kms"] = found["field"]["velocity_jitter_kms"]
         run("limits", "known.json", "--out", "limits", "--draws", 1000, "--force")
         line["chance"] = chance(folder / "limits", third_d)
         orbit = ("--k-kms", THIRD_KMS, "--porb-over-prot", third_d / PROT_D, "--phi", phase)

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 /// For an unobserved star the config gives schedule (or cycles), velocity bins and S/N under `observations.simulate`,
 /// and the spots by `imaging.spot_amplitude`, `spot_slope`, `spot_lifetime_d` (default values if not given). For an
 /// observed star the section `plan` gives the next nights. Sensitivities follow in closed form, marginalised over
-/// evolving-spot maps; nothing is simulated. Several configs, or several numbers of nights, are compared. --next chooses
-/// the nights that say most of one planet. Writes
+/// evolving-spot maps; nothing is simulated. Several configs, or several numbers of nights, are compared. --next
+/// chooses the nights that say most of one planet. Writes
 /// plan.json and plan.csv (period, uncertainty of K, K detected with a probability of 50 and 95 %).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc plan configs/demo.json --out runs/demo_plan\n  \

@@ -6,7 +6,8 @@
 //! largest s and the largest excess e of the discs that overlap. Where spots come and go each profile has a map of its
 //! own. The same simulation gives the same numbers on every machine and with any number of threads.
 //!
-//! [`Schedule`] draws times of observation, from a [`Site`] those at night, [`RandomSpots`] spots; `maps` puts them on a grid.
+//! [`Schedule`] draws times of observation, from a [`Site`] those at night, [`RandomSpots`] spots; `maps` puts them on
+//! a grid.
 
 mod maps;
 mod random_spots;

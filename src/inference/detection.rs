@@ -6,8 +6,8 @@
 //! again in an expansion around the image that it implies, and so on until K stays. A second planet is searched for in
 //! the last expansion, where the first is small.
 //!
-//! Planets of known ephemeris belong to the star: all is searched beside them, their K left free. Where the first planet
-//! of a config is one of them, the best orbit is its own.
+//! Planets of known ephemeris belong to the star: all is searched beside them, their K left free. Where the first
+//! planet of a config is one of them, the best orbit is its own.
 
 mod known;
 mod remarks;

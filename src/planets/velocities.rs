@@ -38,8 +38,8 @@ impl VelocityQuadratic {
         self.gradient.dot(v) - 0.5 * v.dot(&(&self.information * v))
     }
 
-    /// The same with the amplitudes of the columns of `x` (profiles x amplitudes) left free: gradient `Q g`, information
-    /// `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). `None` where they are not bounded.
+    /// The same with the amplitudes of the columns of `x` (profiles x amplitudes) left free: gradient `Q g`,
+    /// information `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). `None` where they are not bounded.
     pub fn beside(&self, x: &DMatrix<f64>) -> Option<Self> {
         let ix = &self.information * x;
         let answer = x.tr_mul(&ix).cholesky()?.solve(&x.transpose());

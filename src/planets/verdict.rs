@@ -152,8 +152,8 @@ pub fn one_sided(z: f64) -> f64 {
 }
 
 impl Verdict {
-    /// Of a planet of known ephemeris, with its number (from 1) where there are several: `alone` is K with its error where there is no planet in the model, `signal`
-    /// where there is, and its 95 % upper limit. The false-alarm probability is that of one period, one-sided.
+    /// Of a planet of known ephemeris, with its number (from 1) where there are several: `alone` is K with its error
+    /// where it is not in the model, `signal` where it is, and its 95 % upper limit. The false-alarm probability is that of one period, one-sided.
     pub fn of_known(
         planet: Option<usize>,
         alone: [f64; 2],
@@ -254,7 +254,8 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
         Finding::NotJudged => return String::new(),
     };
     format!(
-        "Known planet{planet}: {head}. {}; K > 0 at {significance:.1}σ (one-sided p = {}); K < {} (95 % upper limit).{}",
+        "Known planet{planet}: {head}. {}; K > 0 at {significance:.1}σ (one-sided p = {}); K < {} (95 % upper \
+        limit).{}",
         signal.words(),
         probability(chance),
         speed(k_upper95_kms, signal.sigma_k_kms),

@@ -5,9 +5,9 @@ use crate::desk::{Desk, says, star};
 use serde_json::{Value, json};
 
 /// Periods and conjunctions (d), semi-amplitudes (km/s).
-const PERIODS_D: [f64; 2] = [4.9, 8.3];
+const PERIODS_D: [f64; 2] = [4.9, 10.7];
 const CONJUNCTIONS_D: [f64; 2] = [1.2, 5.1];
-const K_KMS: [f64; 2] = [0.30, 0.20];
+const K_KMS: [f64; 2] = [0.24, 0.16];
 
 /// A star whose spots change, with two planets.
 fn config() -> Value {

@@ -63,8 +63,8 @@ impl Site {
         (DATES_JD[0]..=DATES_JD[1]).contains(&(self.time_zero_jd + time_d))
     }
 
-    /// The longest time (d) without a break in which the star is observable in the night whose evening is that of the
-    /// local day of `time_d`: first and last moment. `None` where it is not.
+    /// The longest time (d) without a break in which the star is observable in the night of `time_d`, from local noon to
+    /// noon: first and last moment. `None` where it is not.
     pub fn window_d(&self, time_d: f64) -> Option<[f64; 2]> {
         let jd = self.time_zero_jd + time_d;
         // local noon: Julian days begin at noon in Greenwich
@@ -144,9 +144,9 @@ mod tests {
         let of_day = |jd: f64| 24.0 * ((jd + 0.5).fract());
         assert!((20.3..21.5).contains(&of_day(first)) && (2.5..4.0).contains(&of_day(last)), "{first} {last}");
         // the same night, told by a time after midnight or with a constant subtracted
-        assert_eq!(site.window_d(2_461_268.2), Some([first, last]));
+        assert_eq!(site.window_d(2_461_267.6), Some([first, last]));
         let less = Site { time_zero_jd: 2_400_000.5, ..site };
-        let [a, _] = less.window_d(61_267.4).unwrap();
+        let [a, _] = less.window_d(61_267.1).unwrap();
         assert!((a + 2_400_000.5 - first).abs() < 1e-6);
         assert_eq!(site.window_d(2_461_110.0), None);
         assert!(site.has_date(2_461_110.0) && !site.has_date(12.0));

@@ -147,7 +147,11 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
         vsys_kms: offset_kms,
         rotation_period_d: period_d / porb_over_prot,
         sigma: [Some(sigma_k_kms), sigma_porb_over_prot],
-        orbit_is: if file.blind.is_some() { "known planet" } else { "best orbit" },
+        orbit_is: match (&file.blind, motion.second) {
+            (None, _) => "best orbit",
+            (Some(_), None) => "known planet",
+            (Some(_), Some(_)) => "known planets",
+        },
         events: events(&file.provenance, cycle.len()),
     };
     let mut figure = curves.draw();

@@ -80,7 +80,7 @@ impl Known {
         self.planets.iter().for_each(|planet| planet.ephemeris.write(planet.alone[0].max(0.0), values));
     }
 
-    /// The star `here`, at `values`, with its velocities whole: a second planet in the model has been taken out of them.
+    /// The star `here`, at `values`, with its velocities whole: a second planet in the model was taken out of them.
     pub fn whole(&self, mut here: Linearised, values: &ParameterValues) -> Linearised {
         let second = values.second.filter(|_| self.planets.iter().any(|planet| planet.ephemeris.planet == 1));
         if let Some(second) = second.map(|second| second.eccentric()) {

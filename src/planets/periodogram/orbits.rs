@@ -100,8 +100,8 @@ pub fn at(quadratic: &VelocityQuadratic, frequency: f64) -> Trial {
     scan(quadratic, &[frequency])[0]
 }
 
-/// Information on (a, b) of an orbit at one frequency with the amplitudes of one at another left free; `None` where those
-/// are not bounded.
+/// Information on (a, b) of an orbit at one frequency with the amplitudes of one at another left free; `None` where
+/// those are not bounded.
 pub fn between(quadratic: &VelocityQuadratic, frequency: f64, other: f64) -> Option<Matrix2<f64>> {
     let x = design(&quadratic.cycles, &[frequency, other]);
     let a = x.tr_mul(&(&quadratic.information * &x));

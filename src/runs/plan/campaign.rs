@@ -298,7 +298,9 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
 /// signal-to-noise ratio is planned.
 fn next(plan: &PlanSection, taken: &Observations, settings: &Settings) -> Result<Observations, ConfigError> {
     let last_d = taken.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let first_d = plan.first_d.unwrap_or(last_d.floor() + 1.0);
+    // nights of a place are not those of the time scale
+    let usual_d = if plan.site.is_some() { last_d + 1.0 } else { last_d.floor() + 1.0 };
+    let first_d = plan.first_d.unwrap_or(usual_d);
     let usual = median(taken.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect());
     let sigma = plan.snr.map_or(usual, f64::recip);
     let like = &taken.profiles[taken.profiles.len() - 1];

@@ -132,8 +132,8 @@ pub struct PlanSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snr: Option<f64>,
     /// From where: profiles are spread over the time in which the star is observable, in place of
-    /// `schedule.night_hours`, and nights in which it is not are left out. Times must then be Julian dates, or such less
-    /// `time_zero_jd`.
+    /// `schedule.night_hours`, and nights in which it is not are left out. Times must then be Julian dates, or such
+    /// less `time_zero_jd`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<Site>,
 }
