@@ -17,6 +17,7 @@ import json
 import math
 import random
 import subprocess
+import textwrap
 from pathlib import Path
 
 import calibration_table
@@ -167,16 +168,16 @@ def table(args):
         sigma = sorted(row[f"sigma_k{number}_kms"] for row in good)[len(good) // 2]
         lines.append([f"{1000 * k:.0f}", len(good), *inside, f"{mean:.2f}", f"{scatter:.2f}", f"{1000 * sigma:.0f}"])
     head = "K (m/s); stars; within 68 %; within 95 %; mean pull; rms pull; median sigma_K (m/s)"
-    text = calibration_table.table(head.split("; "), lines) + "\n"
     expected = sum(row["chance"] for row in good)
     error = math.sqrt(sum(row["chance"] * (1.0 - row["chance"]) for row in good))
     values = [row["false_alarm"] for row in good]
     p = calibration_table.kolmogorov_smirnov(values)[1]
-    text += (
+    said = (
         f"A third planet of {1000 * THIRD_KMS:.0f} m/s, at periods away from those of both and from the rotation, is "
         f"found in {sum(row['found'] for row in good):.0f} of {len(good)} stars; `limits` expects {expected:.1f} ± "
-        f"{error:.1f}. Without it the lowest FAP of the blind search is {min(values):.2g} (KS p = {p:.2g}).\n"
+        f"{error:.1f}. Without it the lowest FAP of the blind search is {min(values):.2g} (KS p = {p:.2g})."
     )
+    text = f"{calibration_table.table(head.split('; '), lines).rstrip()}\n\n{textwrap.fill(said, 120)}\n"
     text += "".join(f"- {row['seed']:.0f}: {row['error']}\n" for row in rows if row["error"] != "")
     calibration_table.under_the_head(args.out, "Two transiting planets", text)
 

@@ -7,8 +7,8 @@ Each star has 14 evolving spots, drawn as pixels by `dimcmc simulate`, and no pl
 follow, with one to four profiles each. `dimcmc plan --next 6` knows the profiles that are taken and the times of the
 others; it chooses for a planet of a period drawn for each star. Then the profiles of the nights it chose, of six evenly
 spaced and of six random ones are searched by `dimcmc periodogram` with those taken before, and sigma_K at that period
-is compared. One line per star goes to results/calibration/next-nights.csv; the second command writes the table under
-the head of results/plan.md.
+is compared. One line per star goes to results/calibration/next-nights.csv; the second command writes the table at the
+end of results/plan.md.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import json
 import math
 import random
 import subprocess
+import textwrap
 from pathlib import Path
 
 import calibration_table
@@ -123,15 +124,13 @@ def table(args):
     head = "six nights; median sigma_K (m/s); over that of the chosen; stars on which the chosen are better"
     best = sum(row["chosen"] < min(row["even"], row["random"]) for row in good)
     ratio = median([row["chosen"] / row["forecast"] for row in good])
-    text = calibration_table.table(head.split("; "), lines) + (
-        f"\nOn {best} of {len(good)} stars the nights chosen give a smaller sigma_K than both others. What is achieved "
-        f"is {ratio:.2f} of the forecast (median).\n"
+    said = (
+        f"On {best} of {len(good)} stars the nights chosen give a smaller sigma_K than both others. What is achieved is "
+        f"{ratio:.2f} of the forecast (median)."
     )
+    text = f"{calibration_table.table(head.split('; '), lines).rstrip()}\n\n{textwrap.fill(said, 120)}\n"
     text += "".join(f"- {row['seed']:.0f}: {row['error']}\n" for row in rows if row["error"] != "")
-    mark, title = "<!-- next nights -->\n", "## The next nights\n"
-    note = args.out.read_text()
-    before = note.partition(mark)[0] if mark in note else f"{note.rstrip()}\n\n{title}\n"
-    args.out.write_text(f"{before}{mark}\n{text.rstrip()}\n")
+    calibration_table.under_the_head(args.out, "Plans", text)
 
 
 if __name__ == "__main__":
