@@ -327,6 +327,8 @@ impl Imager {
             all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
             let mut k = before..first;
             set.own_maps.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
+            let mut k = before..first;
+            set.exposures.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
         // a data set of which nothing is left is none
         let mut zero_points = self.zero_points.clone();

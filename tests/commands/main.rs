@@ -13,6 +13,7 @@ mod cli;
 mod compare;
 mod data_sets;
 mod export;
+mod exposures;
 mod faults;
 mod grid;
 mod import;

@@ -7,6 +7,7 @@ mod marginal;
 mod chain;
 mod ensemble;
 mod expansion;
+mod exposures;
 mod field;
 mod field_algebra;
 mod field_settling;

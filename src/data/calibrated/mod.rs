@@ -127,15 +127,17 @@ pub fn of_sets(imager: &Imager, observations: &Observations) -> Vec<Observations
 }
 
 /// The profiles of a `set` within its velocity range, in units of their continuum, errors times the factor of the
-/// config.
+/// config, with its exposure time where they have none.
 fn used(set: &DataSetSettings, profiles: &ProfileSet) -> Result<Observations, LsdError> {
-    match set.source {
+    let mut used = match set.source {
         ObservationSource::Files { velocity_range_kms, sigma_scale, continuum_level, .. } => {
             let observations = profiles.within(velocity_range_kms, sigma_scale)?;
-            Ok(if continuum_level == 1.0 { observations } else { observations.over_continuum(continuum_level) })
+            if continuum_level == 1.0 { observations } else { observations.over_continuum(continuum_level) }
         }
-        ObservationSource::Simulate(_) => Ok(profiles.observations.clone()),
-    }
+        ObservationSource::Simulate(_) => profiles.observations.clone(),
+    };
+    used.profiles.iter_mut().for_each(|profile| profile.exposure_s = profile.exposure_s.or(set.exposure_s));
+    Ok(used)
 }
 
 /// What a reader of results must know of the files.
@@ -181,7 +183,7 @@ fn correlated_bins(parts: &[Observations], errors: &[Option<MeasuredErrors>]) ->
 }
 
 /// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of
-/// bins, and velocity, intensity and sigma of each bin.
+/// bins, exposure time where it is known, and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
     let step = observations.step_kms();
     let mut hash = Sha256::new();
@@ -189,6 +191,9 @@ pub fn fingerprint(observations: &Observations) -> String {
     for profile in &observations.profiles {
         hash.update(profile.time_d.to_le_bytes());
         hash.update((profile.intensity.len() as u64).to_le_bytes());
+        if let Some(exposure_s) = profile.exposure_s {
+            hash.update(exposure_s.to_le_bytes());
+        }
         for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
             for number in [profile.velocity_kms(j), *intensity, *sigma] {
                 hash.update(number.to_le_bytes());

@@ -22,6 +22,7 @@ pub use identity::{Difference, first_difference, jitter_difference, section_diff
 pub use instruments::{SPECTROGRAPHS, Spectrograph};
 pub use settings::{
     DataSetSettings, FITTED, GridSettings, LightCurveSettings, LightSource, MOST_NODES, ObservationSource, Settings,
+    too_long,
 };
 pub use written::{
     Automatic, EquivalentWidth, EventWindows, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection,

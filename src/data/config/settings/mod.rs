@@ -12,7 +12,7 @@ mod simulation;
 mod star;
 
 pub use grid::{GridSettings, MOST_NODES};
-pub use observations::{DataSetSettings, ObservationSource};
+pub use observations::{DataSetSettings, ObservationSource, too_long};
 pub use photometry::{LightCurveSettings, LightSource};
 pub use star::FITTED;
 
