@@ -3,7 +3,8 @@
 //! [`calibrated`](super::calibrated) makes of them what enters the model.
 
 use crate::data::config::{
-    ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings, too_long,
+    ConfigError, DataSetSettings, IndicatorSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
+    too_long,
 };
 use crate::data::io::FileError;
 use crate::data::io::light_curve::{self, Measurements};
@@ -25,6 +26,8 @@ pub struct Dataset {
     pub sets: Vec<ProfileSet>,
     /// The light curves.
     pub light_curves: Vec<Measurements>,
+    /// The activity indicators, their values in place of fluxes.
+    pub indicators: Vec<Measurements>,
     /// The files that they come from.
     pub files: Vec<PathBuf>,
 }
@@ -93,7 +96,11 @@ impl Dataset {
         no_light_curve_twice(settings, &light_curves)?;
         let times_d: Vec<f64> = sets.iter().flat_map(|set: &ProfileSet| set.observations.times_d()).collect();
         light_curves.iter_mut().for_each(|curve| curve.count_as(&times_d));
-        Ok(Dataset { sets, light_curves, files })
+        files.extend(settings.indicators.iter().map(|indicator| indicator.path.clone()));
+        let read = |indicator: &IndicatorSettings| light_curve::read_indicator(&indicator.path);
+        let mut indicators = settings.indicators.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        indicators.iter_mut().for_each(|indicator| indicator.count_as(&times_d));
+        Ok(Dataset { sets, light_curves, indicators, files })
     }
 }
 

@@ -17,6 +17,7 @@ mod exposures;
 mod faults;
 mod grid;
 mod import;
+mod indicators;
 mod init;
 mod injection;
 mod instruments;

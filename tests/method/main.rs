@@ -15,6 +15,7 @@ mod figure;
 mod first_look;
 mod forward;
 mod imaging;
+mod indicators;
 mod light;
 mod lsd;
 mod maps;
