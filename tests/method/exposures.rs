@@ -228,7 +228,7 @@ fn exposures_that_are_too_long_are_refused() {
         (8650.0, "8650 s is 0.1001 of a rotation (star.rotation_period_d 1 d), at most 0.1 is modelled"),
         (-1.0, "-1 s must be 0 or more"),
     ] {
-        let message = scene(&config("spottedness", Some(exposure_s))).err().expect("refused");
+        let message = scene(&config("spottedness", Some(exposure_s))).expect_err("refused");
         assert!(message.contains(&format!("observations.exposure_s: {problem}")), "{message}");
     }
     assert!(scene(&config("spottedness", Some(8640.0))).is_ok());
