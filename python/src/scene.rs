@@ -51,6 +51,7 @@ impl Arrays<'_> {
             step_kms: *step_kms,
             intensity: intensity.row(k).to_vec(),
             sigma: sigma.row(k).to_vec(),
+            exposure_s: None,
         };
         Ok(Observations { profiles: (0..times.len()).map(profile).collect() })
     }

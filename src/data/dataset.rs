@@ -2,7 +2,10 @@
 //! and light curves, errors as quoted. A command reads or simulates them once, and nobody changes them:
 //! [`calibrated`](super::calibrated) makes of them what enters the model.
 
-use crate::data::config::{ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings};
+use crate::data::config::{
+    ConfigError, DataSetSettings, IndicatorSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
+    too_long,
+};
 use crate::data::io::FileError;
 use crate::data::io::light_curve::{self, Measurements};
 use crate::data::io::lsd::{self, Label, LsdError};
@@ -23,6 +26,8 @@ pub struct Dataset {
     pub sets: Vec<ProfileSet>,
     /// The light curves.
     pub light_curves: Vec<Measurements>,
+    /// The activity indicators, their values in place of fluxes.
+    pub indicators: Vec<Measurements>,
     /// The files that they come from.
     pub files: Vec<PathBuf>,
 }
@@ -78,6 +83,7 @@ impl Dataset {
                 files.push(path.clone());
             }
             files.extend(profiles.labels.iter().filter_map(|label| label.path.clone()));
+            check_exposures(settings, set, &profiles)?;
             sets.push(without_excluded(settings, set, profiles)?);
         }
         files.extend(settings.light_curves.iter().filter_map(|curve| match &curve.source {
@@ -90,13 +96,17 @@ impl Dataset {
         no_light_curve_twice(settings, &light_curves)?;
         let times_d: Vec<f64> = sets.iter().flat_map(|set: &ProfileSet| set.observations.times_d()).collect();
         light_curves.iter_mut().for_each(|curve| curve.count_as(&times_d));
-        Ok(Dataset { sets, light_curves, files })
+        files.extend(settings.indicators.iter().map(|indicator| indicator.path.clone()));
+        let read = |indicator: &IndicatorSettings| light_curve::read_indicator(&indicator.path);
+        let mut indicators = settings.indicators.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        indicators.iter_mut().for_each(|indicator| indicator.count_as(&times_d));
+        Ok(Dataset { sets, light_curves, indicators, files })
     }
 }
 
 /// Profiles that are in no file, with names for them.
 pub fn in_memory(observations: Observations, name: impl Fn(usize) -> String) -> ProfileSet {
-    let label = |k: usize| Label { file: name(k), path: None, vrad_kms: 0.0 };
+    let label = |k: usize| Label { file: name(k), path: None, vrad_kms: 0.0, line: 0 };
     let labels = (0..observations.profiles.len()).map(label).collect();
     ProfileSet { observations, labels, sha256: None, remarks: Vec::new() }
 }
@@ -142,6 +152,21 @@ fn without_excluded(
         all.remarks.push(format!("{left_out} of {before} left out: they lie within the times of exclude"));
     }
     Ok(all)
+}
+
+/// That no profile is exposed for longer than is modelled.
+fn check_exposures(settings: &Settings, set: &DataSetSettings, profiles: &ProfileSet) -> Result<(), SceneError> {
+    for (profile, label) in profiles.observations.profiles.iter().zip(&profiles.labels) {
+        let Some(problem) = profile.exposure_s.and_then(|seconds| too_long(seconds, &set.star)) else { continue };
+        let problem = format!("{}: exposure time of {problem}", label.file);
+        return Err(match &set.source {
+            ObservationSource::Files { path, .. } if label.line > 0 => {
+                FileError::Line { path: path.clone(), line: label.line, problem }.into()
+            }
+            _ => settings.fault(&set.key, &problem).into(),
+        });
+    }
+    Ok(())
 }
 
 /// That the star was observed more than once, whatever the data sets are.

@@ -16,10 +16,12 @@ use crate::star::injection::inject;
 use crate::star::observation::{Observations, Profile};
 use crate::surface::calibration::events::{ByHand, Events};
 use crate::surface::calibration::star::MeasuredStar;
-use crate::surface::calibration::{self, Asked, FoundStar};
+use crate::surface::calibration::{self, Asked, FoundStar, indicators};
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Known, NoMaps, OtherRotation, SurfaceMaps, SurfaceSettings};
+use crate::surface::indicator::Indicator;
+use crate::surface::photometry::Flux;
+use crate::surface::{At, FittedIndicator, Known, NoMaps, OtherRotation, SurfaceMaps, SurfaceSettings};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,6 +57,9 @@ pub struct Scene {
     /// What the observations are imaged with.
     #[doc(hidden)]
     pub imager: Imager,
+    /// The values of each activity indicator, in the order of time.
+    #[doc(hidden)]
+    pub indicators: Vec<Vec<Flux>>,
     /// The free parameters, starting at the config's values; its dimension may be 0.
     #[doc(hidden)]
     pub space: ParameterSpace,
@@ -106,16 +111,50 @@ impl Scene {
     }
 
     fn calibrated(settings: Settings, data: Arc<Dataset>, calibrated: Calibrated) -> Self {
-        let Calibrated { observations, sha256, measured, chi2_target, imager } = calibrated;
+        let Calibrated { observations, sha256, measured, chi2_target, imager, indicators } = calibrated;
         let truth = settings.sets[0].simulation().map(|simulation| simulation.truth);
         let space = space(&settings.free, &settings, &imager);
-        Scene { settings, data, observations, data_sha256: sha256, truth, measured, chi2_target, imager, space }
+        let data_sha256 = sha256;
+        Scene { settings, data, observations, data_sha256, truth, measured, chi2_target, imager, indicators, space }
     }
 
     /// The same with numbers of the star that the config leaves to the profiles; `report` is told what is under way.
     /// Where there is no fit they stay as they are, and results say why.
     #[must_use]
-    pub fn fitted(mut self, report: &dyn Fn(&str)) -> Self {
+    pub fn fitted(self, report: &dyn Fn(&str)) -> Self {
+        self.with_fitted_indicators(report).with_fitted_star(report)
+    }
+
+    /// The same with indicators by the gains that profiles and values have them have.
+    fn with_fitted_indicators(mut self, report: &dyn Fn(&str)) -> Self {
+        if self.indicators.is_empty() || !self.measured.indicators.is_empty() {
+            return self;
+        }
+        report("fitting indicators");
+        let named = self.settings.indicators.iter().zip(&self.indicators);
+        let named: Vec<(&str, &[Flux])> = named.map(|(of, values)| (&*of.name, &values[..])).collect();
+        match indicators::fitted(&self.imager, self.settings.values, self.settings.known_field(), &named) {
+            Ok(found) => self.with_indicators(&found),
+            Err(error) => {
+                self.measured.indicator_notes.push(format!("not used: {error}"));
+                self
+            }
+        }
+    }
+
+    /// The same with indicators as they were fitted.
+    fn with_indicators(mut self, found: &[FittedIndicator]) -> Self {
+        let used = found.iter().zip(&self.indicators).filter(|(found, _)| found.is_used());
+        let of = |(found, values): (&FittedIndicator, &Vec<Flux>)| {
+            Indicator::new(&found.name, values, found.gain, found.jitter)
+        };
+        self.imager.indicators = used.map(of).collect();
+        self.measured.indicators = found.to_vec();
+        self
+    }
+
+    /// The same with what is fitted of star and events.
+    fn with_fitted_star(mut self, report: &dyn Fn(&str)) -> Self {
         let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
         let contrasts = self.fitted_contrasts();
         let (known, values) = (self.settings.known_field(), self.settings.values);
@@ -179,9 +218,13 @@ impl Scene {
     #[must_use]
     #[doc(hidden)]
     pub fn with_found(self, found: &Measured) -> Self {
+        let scene = match found.indicators.is_empty() || !self.measured.indicators.is_empty() {
+            true => self,
+            false => self.with_indicators(&found.indicators),
+        };
         let mut scene = match &found.star {
-            Some(star) => self.with_star(star.clone()),
-            None => self,
+            Some(star) => scene.with_star(star.clone()),
+            None => scene,
         };
         scene.measured.field_start = scene.measured.field_start.or(found.field_start);
         scene.measured.other_rotation = scene.measured.other_rotation.or(found.other_rotation);
@@ -248,7 +291,8 @@ impl Scene {
         let Scene { settings, data, measured, chi2_target, imager, .. } = self;
         let (measured, imager) = (measured.clone(), imager.clone());
         let sha256 = self.data_sha256.clone();
-        let before = Calibrated { observations, sha256, measured, chi2_target: *chi2_target, imager };
+        let (chi2_target, indicators) = (*chi2_target, self.indicators.clone());
+        let before = Calibrated { observations, sha256, measured, chi2_target, imager, indicators };
         let Measured { star, drift_kms_d, sets, .. } = self.measured.clone();
         let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?);
         let scene = scene.with_drift(&drift_kms_d).with_contrasts(&sets);

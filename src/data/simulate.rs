@@ -19,8 +19,9 @@ pub use schedule::Schedule;
 pub use site::Site;
 
 use crate::model::ParameterValues;
+use crate::numerics::units::SECONDS_PER_DAY;
 use crate::star::observation::{Observations, Profile};
-use crate::star::{Band, Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use crate::star::{Band, Brightness, Facula, Quadrature, Response, Sampling, Seen, Spot, StarSettings, SurfaceGrid};
 use crate::surface::nuisances::{LineAndContinuum, templates};
 use crate::surface::photometry::Flux;
 use maps::Content;
@@ -64,7 +65,12 @@ pub struct Simulation {
     /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
     /// white noise.
     pub correlated_bins: f64,
+    /// Exposure time of all profiles (s); instants if `None`.
+    pub exposure_s: Option<f64>,
 }
+
+/// How often a star that is simulated is looked at in an exposure, over how often the model looks.
+const FINER_LOOKS: usize = 3;
 
 /// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
 const CONTINUUM_STREAM: u64 = 1;
@@ -90,8 +96,12 @@ impl Simulation {
         let own = self.first_velocity_kms - self.zero_point_kms;
         let first = |k: usize| zero_points.get(k).map_or(own, |v| own - v);
         let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
-        let sampling = Sampling { step_kms: self.step_kms, profiles };
-        let response = Response::new(&grid, star, &state, &sampling);
+        let mut seen = Seen::from(Sampling { step_kms: self.step_kms, profiles });
+        if let Some(exposure_s) = self.exposure_s {
+            seen.exposures = seen.exposures(star, &state, &vec![exposure_s / SECONDS_PER_DAY; self.times_d.len()]);
+            seen.exposures.iter_mut().for_each(|exposure| exposure.looks *= FINER_LOOKS);
+        }
+        let response = Response::of_sets(&grid, star, &state, &[seen]);
         let contrast = self.contrast(star);
         let mut depths = match self.is_changing() {
             true => {
@@ -114,6 +124,7 @@ impl Simulation {
             step_kms: self.step_kms,
             intensity: intensity.to_vec(),
             sigma: vec![self.sigma(); self.bins],
+            exposure_s: self.exposure_s,
         };
         let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
         Observations { profiles }

@@ -48,6 +48,33 @@ impl Evidence {
         after
     }
 
+    /// Numbers that are linear in the field, given by a row each (numbers, H), at a time (d) each: their means and
+    /// their covariance after the data.
+    pub fn predicted(&self, rows: &DMatrix<f64>, times_d: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let coefficients = self.coefficients_at(times_d);
+        let mean = DVector::from_fn(rows.nrows(), |k, _| rows.row(k).transpose().dot(&coefficients.column(k)));
+        let mut scaled = rows.transpose();
+        scale_rows(&mut scaled, &self.sd);
+        let mut known = &self.numbers.rows * &scaled;
+        let correlations = self.field.kernel.between(&self.numbers.times_d, times_d);
+        for (mut known, correlations) in known.column_iter_mut().zip(correlations.column_iter()) {
+            for (part, correlation) in self.numbers.parts.iter().zip(&correlations) {
+                let mut rows = known.rows_range_mut(part.clone());
+                rows *= *correlation;
+            }
+        }
+        self.covariance.forward(&mut known);
+        let before = scaled.tr_mul(&scaled).component_mul(&self.field.kernel.between(times_d, times_d));
+        (mean, before - known.tr_mul(&known))
+    }
+
+    /// The variances of such numbers before the data.
+    pub fn variances_before(&self, rows: &DMatrix<f64>) -> Vec<f64> {
+        let mut scaled = rows.transpose();
+        scale_rows(&mut scaled, &self.sd);
+        scaled.column_iter().map(|row| row.norm_squared()).collect()
+    }
+
     /// The Newton step (H, epochs) from coefficients c (H, epochs) for a `field` and a model that may differ somewhat
     /// from those of this evidence, where `pulled` is `J^T N^-1 misfit` (H, epochs) at c:
     /// `(1 - K J^T C^-1 J) (K' pulled - c)`, K' of that field, all else of this evidence. With all of one model that is

@@ -6,6 +6,7 @@
 //! rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
 
 use super::StarState;
+use super::exposure::Exposure;
 use super::filling::{Refill, Source};
 use super::grid::SurfaceGrid;
 use super::kernel;
@@ -26,6 +27,43 @@ pub struct Deposit {
     pub nodes: usize,
     pixels: usize,
     placement: Placement,
+    looks: Looks,
+}
+
+/// When the star is looked at: once a profile, or several times in its exposure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Looks {
+    /// Times since the star's epoch (d), of one profile after another.
+    pub since_epoch_d: Vec<f64>,
+    /// What each counts in its profile.
+    weights: Vec<f64>,
+    /// First look of each profile, and the end; empty where each profile has one.
+    starts: Vec<usize>,
+}
+
+impl Looks {
+    /// At profiles that are taken at these times since the star's epoch (d); without exposures, at instants.
+    pub fn new(since_epoch_d: impl Iterator<Item = f64>, exposures: &[Exposure]) -> Self {
+        if exposures.is_empty() {
+            return Looks { since_epoch_d: since_epoch_d.collect(), weights: Vec::new(), starts: Vec::new() };
+        }
+        let mut looks = Looks { since_epoch_d: Vec::new(), weights: Vec::new(), starts: vec![0] };
+        for (time_d, exposure) in since_epoch_d.zip(exposures) {
+            for (from_middle_d, weight) in exposure.looks() {
+                looks.since_epoch_d.push(time_d + from_middle_d);
+                looks.weights.push(weight);
+            }
+            looks.starts.push(looks.since_epoch_d.len());
+        }
+        looks
+    }
+
+    /// The looks of profile `k`, with their weights.
+    #[inline(always)]
+    fn of(&self, k: usize) -> impl Iterator<Item = (usize, f64)> {
+        let looks = if self.starts.is_empty() { k..k + 1 } else { self.starts[k]..self.starts[k + 1] };
+        looks.map(|look| (look, self.weights.get(look).copied().unwrap_or(1.0)))
+    }
 }
 
 /// Pixels in their cells, for deposits of several stars. They may be outside of them for any but the one that it was
@@ -50,8 +88,8 @@ pub struct Observed<'a> {
     pub limb: LimbDarkening,
     /// Whether pixels are weighted by `1 - mu`, too.
     pub limb_alone: bool,
-    /// Times of the observations since the star's epoch (d).
-    pub since_epoch_d: Vec<f64>,
+    /// When it is looked at.
+    pub looks: Looks,
     /// Step (km/s) of the velocity grid that its line takes.
     pub step_kms: f64,
 }
@@ -65,7 +103,7 @@ impl Deposit {
     /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are
     /// to be seen again.
     fn sorted(star: &Observed, margin: f64, again: bool) -> (Self, Option<Source>) {
-        let &Observed { grid, state, limb, limb_alone, ref since_epoch_d, step_kms } = star;
+        let &Observed { grid, state, limb, limb_alone, ref looks, step_kms } = star;
         // what is said of pixels below holds for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
         let order = match grid.len() {
@@ -78,8 +116,9 @@ impl Deposit {
         let reach = reach(&viewer);
         let nodes = 2 * reach as usize + 1;
         let scale = Scale { first_node: -reach, cells: nodes + 1 - DEPOSIT_NODES };
-        let (placement, source) = vector::run(Sort { grid, viewer, sight, scale, order, since_epoch_d, again });
-        (Deposit { step_kms, nodes, pixels: grid.len(), placement }, source)
+        let (placement, source) =
+            vector::run(Sort { grid, viewer, sight, scale, order, since_epoch_d: &looks.since_epoch_d, again });
+        (Deposit { step_kms, nodes, pixels: grid.len(), placement, looks: looks.clone() }, source)
     }
 
     /// Velocity of the grid's first node (km/s).
@@ -107,7 +146,7 @@ impl Deposit {
         self.pixels
     }
 
-    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten). What cells
+    /// Deposits map `x` (one number a pixel) as profile `k` sees it on the velocity grid (overwritten). What cells
     /// leave on each of their nodes is kept in `left`, which is empty at first.
     #[inline(always)]
     #[allow(unsafe_code)]
@@ -115,25 +154,38 @@ impl Deposit {
         assert!(x.len() == self.pixels && nodes.len() == self.nodes);
         assert!(left.is_empty() || left.len() == DEPOSIT_NODES * self.nodes);
         left.resize(DEPOSIT_NODES * self.nodes, N::default());
-        for group in self.placement.groups_of(k) {
-            // safe: groups hold pixels of the grid alone, and its cells
-            unsafe { kernel::gather(N::registers(i), group, x, left) };
-        }
         nodes.fill(0.0);
-        for two in left.chunks_exact(2 * self.nodes) {
-            let (a, b) = two.split_at(self.nodes);
-            nodes.iter_mut().zip(a.iter().zip(b)).for_each(|(node, (a, b))| *node += (*a).into() + (*b).into());
+        for (look, weight) in self.looks.of(k) {
+            for group in self.placement.groups_of(look) {
+                // safe: groups hold pixels of the grid alone, and its cells
+                unsafe { kernel::gather(N::registers(i), group, x, left) };
+            }
+            for two in left.chunks_exact(2 * self.nodes) {
+                let (a, b) = two.split_at(self.nodes);
+                let both = a.iter().zip(b).map(|(a, b)| weight * ((*a).into() + (*b).into()));
+                nodes.iter_mut().zip(both).for_each(|(node, both)| *node += both);
+            }
         }
     }
 
-    /// Transpose of [`Deposit::gather`]: adds to map `out` what observation `k` gives back from the grid `nodes`.
+    /// Transpose of [`Deposit::gather`]: adds to map `out` what profile `k` gives back from the grid `nodes`.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn scatter<N: Number>(&self, i: impl Instructions, k: usize, nodes: &[N], out: &mut [N]) {
         assert!(out.len() == self.pixels && nodes.len() == self.nodes);
-        for group in self.placement.groups_of(k).filter(|group| !group.blocks.is_empty()) {
-            // safe: as above
-            unsafe { kernel::scatter(N::registers(i), group, nodes, out) };
+        let mut weighted = Vec::new();
+        for (look, weight) in self.looks.of(k) {
+            let nodes = if weight == 1.0 {
+                nodes
+            } else {
+                weighted.clear();
+                weighted.extend(nodes.iter().map(|node| N::of(weight * (*node).into())));
+                &weighted
+            };
+            for group in self.placement.groups_of(look).filter(|group| !group.blocks.is_empty()) {
+                // safe: as above
+                unsafe { kernel::scatter(N::registers(i), group, nodes, out) };
+            }
         }
     }
 }
@@ -142,7 +194,7 @@ impl Arranged {
     /// Pixels as those of a star are seen, with a margin (rad) beyond the limb.
     pub fn new(star: &Observed, margin: f64) -> Self {
         let (deposit, source) = Deposit::sorted(star, margin, true);
-        let Deposit { step_kms, nodes, pixels, ref placement } = deposit;
+        let Deposit { step_kms, nodes, pixels, ref placement, .. } = deposit;
         let arrangement = Arc::clone(placement.arrangement());
         Arranged { step_kms, nodes, pixels, arrangement, source: source.expect("asked for") }
     }
@@ -150,11 +202,11 @@ impl Arranged {
     /// Deposits of the same pixels as those of another star are seen at the same times, on the same grid.
     pub fn deposit(&self, star: &Observed) -> Deposit {
         let &Arranged { step_kms, nodes, pixels, ref arrangement, ref source } = self;
-        let &Observed { grid, state, limb, limb_alone, ref since_epoch_d, .. } = star;
+        let &Observed { grid, state, limb, limb_alone, ref looks, .. } = star;
         assert!(grid.len() == pixels && star.step_kms == step_kms);
         let viewer = Viewer::new(state, limb, limb_alone, step_kms);
-        let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d });
-        Deposit { step_kms, nodes, pixels, placement }
+        let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d: &looks.since_epoch_d });
+        Deposit { step_kms, nodes, pixels, placement, looks: looks.clone() }
     }
 }
 

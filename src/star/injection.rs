@@ -41,6 +41,7 @@ pub fn shifted(profile: &Profile, velocity_kms: f64) -> Profile {
         step_kms: profile.step_kms,
         intensity: resampled(&profile.intensity, bins),
         sigma: linear(&variance, bins).into_iter().map(f64::sqrt).collect(),
+        exposure_s: profile.exposure_s,
     }
 }
 
@@ -112,7 +113,7 @@ mod tests {
         let first_velocity_kms = -72.0;
         let velocity = |j: usize| first_velocity_kms + j as f64 * STEP;
         let intensity = (0..81).map(|j| 1.0 - 0.3 * (-0.5 * ((velocity(j) - centre) / 3.2).powi(2)).exp()).collect();
-        Profile { time_d: 0.0, first_velocity_kms, step_kms: STEP, intensity, sigma: vec![1e-3; 81] }
+        Profile { time_d: 0.0, first_velocity_kms, step_kms: STEP, intensity, sigma: vec![1e-3; 81], exposure_s: None }
     }
 
     fn apart(a: &Profile, b: &Profile) -> f64 {
@@ -141,7 +142,14 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let n = 200_000;
         let intensity: Vec<f64> = (0..n).map(|_| rng.sample::<f64, _>(StandardNormal)).collect();
-        let noise = Profile { time_d: 0.0, first_velocity_kms: 0.0, step_kms: STEP, intensity, sigma: vec![1.0; n] };
+        let noise = Profile {
+            time_d: 0.0,
+            first_velocity_kms: 0.0,
+            step_kms: STEP,
+            intensity,
+            sigma: vec![1.0; n],
+            exposure_s: None,
+        };
         for (part, variance, neighbours) in [(0.0, 1.0, 0.0), (0.25, 0.965, 0.036), (0.5, 0.930, 0.074)] {
             let moved = shifted(&noise, part * STEP).intensity;
             let product = |lag: usize| moved.iter().zip(&moved[lag..]).map(|(a, b)| a * b).sum::<f64>() / n as f64;

@@ -6,7 +6,8 @@
 //!
 //! 1. [`grid`] has the pixels, [`spots`] what a simulated map of them holds, [`brightness`] how bright that is.
 //! 2. For each observation: [`rotation`] turns the pixels, `view` finds the visible ones, [`limb_darkening`] darkens
-//!    them, `moments` gives each its weight and velocity. [`orbit`] shifts the whole profile.
+//!    them, `moments` gives each its weight and velocity. [`orbit`] shifts the whole profile; [`exposure`] has the
+//!    times of a long one.
 //! 3. `placement` puts pixels into cells of a velocity grid (`sorting`, `filling`, `block`), `deposit` adds their
 //!    brightness up there (`kernel`).
 //! 4. `convolution` makes bins of that (`correlate`) with the local line (`line_profile`, `voigt`).
@@ -22,6 +23,7 @@ pub mod brightness;
 mod convolution;
 mod correlate;
 mod deposit;
+pub mod exposure;
 mod filling;
 pub mod grid;
 pub mod injection;
@@ -49,6 +51,7 @@ mod view;
 mod voigt;
 
 pub use brightness::{Brightness, BrightnessModel};
+pub use exposure::{Exposure, Smearing};
 pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;

@@ -63,11 +63,11 @@ impl Nearby {
 
     /// Whether all pixels are where they were, nearly.
     fn is_close(&self, pixels: &Arranged, star: &Observed) -> bool {
-        let &Observed { grid, state, ref since_epoch_d, step_kms, .. } = star;
+        let &Observed { grid, state, ref looks, step_kms, .. } = star;
         if step_kms != pixels.step_kms {
             return false;
         }
-        let longest = since_epoch_d.iter().fold(0.0, |longest: f64, time| longest.max(time.abs()));
+        let longest = looks.since_epoch_d.iter().fold(0.0, |longest: f64, time| longest.max(time.abs()));
         let tilt = (state.inclination - self.state.inclination).abs();
         grid.rings.iter().flat_map(|ring| &ring.points).all(|point| {
             let (sin, cos) = (point.sin_latitude, point.cos_latitude);

@@ -15,6 +15,8 @@ pub struct Profile {
     pub intensity: Vec<f64>,
     /// Standard error of each intensity (positive).
     pub sigma: Vec<f64>,
+    /// Length of the exposure (s), if it is known.
+    pub exposure_s: Option<f64>,
 }
 
 /// A radial velocity with its standard error.
@@ -51,13 +53,16 @@ impl Observations {
             return Err(format!("velocity bins of {step} km/s: must be above 0"));
         }
         for (k, profile) in self.profiles.iter().enumerate() {
-            let Profile { time_d, first_velocity_kms, step_kms, intensity, sigma } = profile;
+            let Profile { time_d, first_velocity_kms, step_kms, intensity, sigma, exposure_s } = profile;
             let problem = match (intensity.len(), sigma.len()) {
                 (0, _) => "has no bin".to_owned(),
                 _ if *step_kms != step => format!("has bins of {step_kms} km/s, and the first profile of {step}"),
                 (bins, errors) if bins != errors => format!("has {bins} intensities and {errors} errors"),
                 _ if !(time_d.is_finite() && first_velocity_kms.is_finite()) => {
                     format!("is at {time_d} d and begins at {first_velocity_kms} km/s: must be finite")
+                }
+                _ if exposure_s.is_some_and(|s| !(s >= 0.0 && s.is_finite())) => {
+                    format!("has an exposure of {} s: must be 0 or more", exposure_s.unwrap_or_default())
                 }
                 _ => match intensity.iter().zip(sigma).position(|(i, s)| !(i.is_finite() && s.is_finite() && *s > 0.0))
                 {

@@ -4,11 +4,11 @@
 //! `docs/method.md` section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile.
 
 use super::convolution::{Convolutions, Rows, VelocityGrid};
-use super::deposit::{Deposit, Observed};
+use super::deposit::{Deposit, Looks, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::regions::Mixture;
-use super::seen::Seen;
+use super::seen::{Seen, narrowest};
 use super::{LocalLine, StarSettings, StarState};
 use crate::numerics::vector::{self, Instructions, Number, Task};
 use nalgebra::DMatrixView;
@@ -233,15 +233,6 @@ pub(super) fn needs(star: &StarSettings, limb_alone: bool) -> bool {
     !limb_alone || star.regions.know_the_limb()
 }
 
-/// The narrower one of the star's lines.
-fn narrowest(star: &StarSettings) -> LocalLine {
-    let of_regions = star.regions.line(star.line);
-    match star.regions.are_plain() || star.line.sigma_kms <= of_regions.sigma_kms {
-        true => star.line,
-        false => of_regions,
-    }
-}
-
 /// A star, its surface that of the state, as it is observed.
 pub(super) fn observed<'a>(
     grid: &'a SurfaceGrid,
@@ -252,9 +243,10 @@ pub(super) fn observed<'a>(
 ) -> Observed<'a> {
     let sampling = &seen.sampling;
     let epoch_d = |k: usize| seen.own_maps.get(k).map_or(star.epoch_d, |own| own.epoch_d);
-    let since_epoch_d = sampling.profiles.iter().enumerate().map(|(k, p)| p.0 - epoch_d(k)).collect();
+    let since_epoch_d = sampling.profiles.iter().enumerate().map(|(k, p)| p.0 - epoch_d(k));
+    let looks = Looks::new(since_epoch_d, &seen.exposures);
     let step_kms = sampling.step_kms / LineKernel::steps_per_bin(narrowest(star), sampling.step_kms) as f64;
-    Observed { grid, state, limb: star.limb_darkening, limb_alone, since_epoch_d, step_kms }
+    Observed { grid, state, limb: star.limb_darkening, limb_alone, looks, step_kms }
 }
 
 /// One profile after another, in one direction: the rows of the grid are left as that direction left them.

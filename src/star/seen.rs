@@ -1,6 +1,7 @@
 //! What data sets see of the star: when and at which velocities, and what looks different through each.
 
-use super::{LimbDarkening, LocalLine, Regions, StarSettings, Surface};
+use super::exposure::{Exposure, Smearing};
+use super::{LimbDarkening, LocalLine, Regions, StarSettings, StarState, Surface};
 use crate::star::observation::Observations;
 
 /// When and at which velocities a data set observes the star.
@@ -40,6 +41,8 @@ pub struct Seen {
     pub sampling: Sampling,
     /// The map that each profile sees, where the star has several; empty where it has one.
     pub own_maps: Vec<OwnMap>,
+    /// The exposure of each profile; empty where all are instants.
+    pub exposures: Vec<Exposure>,
 }
 
 /// One of several maps of a star, as one profile sees it.
@@ -51,13 +54,43 @@ pub struct OwnMap {
     pub epoch_d: f64,
 }
 
+/// The narrower one of the star's lines.
+pub(super) fn narrowest(star: &StarSettings) -> LocalLine {
+    let of_regions = star.regions.line(star.line);
+    match star.regions.are_plain() || star.line.sigma_kms <= of_regions.sigma_kms {
+        true => star.line,
+        false => of_regions,
+    }
+}
+
 impl From<Sampling> for Seen {
     fn from(sampling: Sampling) -> Self {
-        Seen { line: None, contrast: None, limb_darkening: None, regions: None, sampling, own_maps: Vec::new() }
+        Seen {
+            line: None,
+            contrast: None,
+            limb_darkening: None,
+            regions: None,
+            sampling,
+            own_maps: Vec::new(),
+            exposures: Vec::new(),
+        }
     }
 }
 
 impl Seen {
+    /// Exposures of these lengths (d), 0 for one that is not known, as this set sees the star at a state; empty where
+    /// all are instants. How often the star is looked at in them does not change with the state any more.
+    pub fn exposures(&self, star: &StarSettings, state: &StarState, lengths_d: &[f64]) -> Vec<Exposure> {
+        let smearing = Smearing {
+            vsini_kms: state.vsini_kms,
+            omega_eq_rad_d: state.rotation.omega_eq_rad_d,
+            bin_kms: self.sampling.step_kms,
+            line_sigma_kms: narrowest(&self.star(star, &state.surface)).sigma_kms,
+        };
+        let exposures: Vec<Exposure> = lengths_d.iter().map(|length_d| smearing.exposure(*length_d)).collect();
+        if exposures.iter().all(|exposure| exposure.looks == 1) { Vec::new() } else { exposures }
+    }
+
     /// The star with such a surface as this set sees it. Where its line is another one than the star's, it changes in
     /// proportion to that.
     pub fn star(&self, star: &StarSettings, surface: &Surface) -> StarSettings {

@@ -16,6 +16,7 @@ use crate::star::observation::{NIGHT_GAP_D, Observations, nights};
 use crate::star::{
     Brightness, Nearby, OwnMap, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid,
 };
+use crate::surface::indicator::Indicator;
 use crate::surface::nuisances::{LineAndContinuum, Nuisances};
 use crate::surface::photometry::LightCurve;
 
@@ -64,6 +65,8 @@ pub struct Imager {
     pub zero_points: Vec<ZeroPointPrior>,
     /// Light curves beside the profiles, of which only integrated maps know; mostly none.
     pub light_curves: Vec<LightCurve>,
+    /// Activity indicators that have to do with the spots, of which only integrated maps know; mostly none.
+    pub indicators: Vec<Indicator>,
     /// Standard deviation of what is wrong alike in all profiles of a data set (continuum 1), of which only integrated
     /// maps know; 0 for none.
     pub mean_profile: f64,
@@ -89,6 +92,7 @@ impl Imager {
             entropy,
             zero_points: Vec::new(),
             light_curves: Vec::new(),
+            indicators: Vec::new(),
             mean_profile: 0.0,
             jitter_shares: Vec::new(),
             night_jitters_kms: Vec::new(),
@@ -327,6 +331,8 @@ impl Imager {
             all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
             let mut k = before..first;
             set.own_maps.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
+            let mut k = before..first;
+            set.exposures.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
         // a data set of which nothing is left is none
         let mut zero_points = self.zero_points.clone();
@@ -379,9 +385,11 @@ impl Imager {
         self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
     }
 
-    /// Number of times at which the star is seen: profiles, and bins of light curves.
+    /// Number of times at which the star is seen: profiles, bins of light curves, and readings of indicators.
     pub fn epochs(&self) -> usize {
-        self.profiles().count() + self.light_curves.iter().map(|curve| curve.bins.len()).sum::<usize>()
+        let bins = self.light_curves.iter().map(|curve| curve.bins.len()).sum::<usize>();
+        let readings = self.indicators.iter().map(|indicator| indicator.readings.len()).sum::<usize>();
+        self.profiles().count() + bins + readings
     }
 
     /// Times of all profiles (d).

@@ -19,6 +19,7 @@ pub mod density;
 pub mod evolving_map;
 pub mod expansion;
 pub mod imaging;
+pub mod indicator;
 mod linearised;
 pub mod maps;
 pub mod mean_profile;
@@ -39,7 +40,7 @@ pub mod planned {
 
 pub use constants::{ConstantVelocity, Constants, FoundDrift};
 pub use evolving_map::contrast::FittedContrast;
-pub use evolving_map::{Change, FieldStart, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation};
+pub use evolving_map::{Change, FieldStart, FittedIndicator, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
 pub use model::{At, OrbitOf, Properties, SurfaceModel};

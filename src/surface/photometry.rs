@@ -106,6 +106,15 @@ impl LightCurve {
     }
 }
 
+/// Measurements in the order of time, the weighted means of those in cells of a width (d).
+pub fn in_bins(measured: &[Flux], width_d: f64) -> Vec<Flux> {
+    let bin = |measured: &[Flux]| {
+        let FluxBin { time_d, flux, sigma, .. } = mean(measured, 0);
+        Flux { time_d, flux, sigma }
+    };
+    cells(measured, width_d).map(bin).collect()
+}
+
 /// The mean of measurements, by their weights.
 fn mean(measured: &[Flux], segment: usize) -> FluxBin {
     let total: f64 = measured.iter().map(|one| one.sigma.powi(-2)).sum();

@@ -75,6 +75,7 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
         sets: vec![oracle.sampling.clone().into()],
         zero_points: Vec::new(),
         light_curves: Vec::new(),
+        indicators: Vec::new(),
         mean_profile: 0.0,
         drifts: Vec::new(),
         jitter_shares: Vec::new(),

@@ -68,6 +68,7 @@ fn with_line(
         velocity_jitter_kms: 0.0,
         zero_point_kms: 0.0,
         correlated_bins: 1.0,
+        exposure_s: None,
     };
     simulation.observe(&star)
 }
@@ -191,6 +192,7 @@ fn made(depth: impl Fn(f64) -> f64) -> Observations {
         step_kms: 1.0,
         intensity: velocities.map(|v| 1.0 - depth(v)).collect(),
         sigma: vec![1e-3; 101],
+        exposure_s: None,
     };
     Observations { profiles: vec![profile.clone(), profile] }
 }

@@ -36,6 +36,7 @@ fn chi2_is_the_sum_of_squared_residuals_over_their_errors() {
         step_kms: 2.0,
         intensity: intensity.to_vec(),
         sigma: sigma.to_vec(),
+        exposure_s: None,
     };
     let profiles = vec![profile(0.0, [0.9, 1.0], [0.1, 0.2]), profile(1.0, [0.8, 0.7], [0.5, 0.05])];
     let data = Data::of(&Observations { profiles });

@@ -63,6 +63,7 @@ fn what_is_written_reads_back() {
         step_kms: 1.8,
         intensity: (0..57).map(|j| 1.0 - 0.1 * ((j * k) as f64).sin().abs() / 3.0).collect(),
         sigma: vec![1e-3 / 3.0; 57],
+        exposure_s: None,
     });
     let written = Observations { profiles: profiles.collect() };
     let dir = tempfile::tempdir().unwrap();
@@ -508,5 +509,68 @@ fn the_profiles_of_lo_peg_are_read() {
         let data = lsd::read(list).unwrap().within(Some((-90.0, 90.0)), 1.0).unwrap();
         assert_eq!((data.profiles.len(), data.profiles[0].intensity.len()), (16, 100));
         assert!((data.mean_equivalent_width_kms() - 2.7175).abs() < 1e-3);
+    }
+}
+
+/// Exposure times stand in a column that is named, and in no other.
+#[test]
+fn exposure_times_are_of_a_named_column() {
+    let dir = folder();
+    let exposures = |list: &str| {
+        std::fs::write(dir.path().join("observations.txt"), list).unwrap();
+        let read = read(dir.path(), None, 1.0)?;
+        Ok::<_, String>(read.profiles.iter().map(|p| (p.first_velocity_kms, p.exposure_s)).collect::<Vec<_>>())
+    };
+    let both = [(-9.0, Some(600.0)), (-10.8, Some(1200.0))];
+    for list in [
+        "# file time_d vrad_kms exposure_s\na.prof 1.5 0 600\nb.prof 2.5 1.8 1200 # cloudy\n",
+        "# two nights\n#\n# File  BJD  vrad (km/s)  exposure (s)\n\na.prof 1.5 0 600\nb.prof 2.5 1.8 1200\n",
+        "file,time_d,exposure_s,vrad_kms\na.prof,1.5,600,0\nb.prof,2.5,1200,1.8\n",
+        "exptime file time rv\n600 a.prof 1.5 0\n1200 b.prof 2.5 1.8\n",
+    ] {
+        assert_eq!(exposures(list).unwrap(), both, "{list}");
+    }
+    // without a velocity, and of one profile alone
+    let list = "# file time_d exposure_s\na.prof 1.5 600\nb.prof 2.5\n";
+    assert_eq!(exposures(list).unwrap(), [(-9.0, Some(600.0)), (-9.0, None)]);
+    // a third column without a name is a velocity, whatever other comments say
+    for list in [
+        "# file time_d vrad_kms\na.prof 1.5 0\nb.prof 2.5 1.8\n",
+        "# file, time and exposure: see the log\na.prof 1.5\nb.prof 2.5 1.8\n",
+        "a.prof 1.5 0\n# file time_d exposure_s\nb.prof 2.5 1.8\n",
+    ] {
+        assert_eq!(exposures(list).unwrap(), [(-9.0, None), (-10.8, None)], "{list}");
+    }
+    for (list, wanted) in [
+        (
+            "a.prof 1.5 0 600\nb.prof 2.5 0 600\n",
+            "observations.txt:1: 4 columns where FILE TIME_DAYS [VRAD_KMS] is due",
+        ),
+        ("a.prof 1.5 0 600\nb.prof 2.5 0 600\n", "a first line `# file time_d vrad_kms exposure_s` names more columns"),
+        (
+            "# file time_d exposure_s\na.prof 1.5 600\nb.prof 2.5 long\n",
+            "observations.txt:3: exposure time \"long\" is",
+        ),
+        (
+            "# file time_d exposure_s\na.prof 1.5 -600\nb.prof 2.5 1\n",
+            "observations.txt:2: exposure time -600 s must be",
+        ),
+    ] {
+        let message = exposures(list).unwrap_err();
+        assert!(message.contains(wanted) && !message.contains('\n'), "{message}");
+    }
+    // what is written reads back
+    std::fs::write(dir.path().join("observations.txt"), "# file time_d exposure_s\na.prof 1.5 600\nb.prof 2.5\n")
+        .unwrap();
+    let all = lsd::read(&dir.path().join("observations.txt")).unwrap();
+    for write in [0, 1] {
+        let other = tempfile::tempdir().unwrap();
+        match write {
+            0 => lsd::write(other.path(), &all.observations).unwrap(),
+            _ => lsd::write_as(other.path(), &all.observations, &all.labels, "again").unwrap(),
+        }
+        let again = lsd::read(&other.path().join("observations.txt")).unwrap();
+        let seconds = |all: &Observations| all.profiles.iter().map(|p| p.exposure_s).collect::<Vec<_>>();
+        assert_eq!(seconds(&again.observations), seconds(&all.observations));
     }
 }

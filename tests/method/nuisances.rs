@@ -26,7 +26,7 @@ fn observations(imager: &Imager) -> Observations {
     let step_kms = imager.sets[0].sampling.step_kms;
     let profiles = imager.profiles().map(|(time_d, first_velocity_kms, n)| {
         let (intensity, sigma) = bins.by_ref().take(n).map(|(d, w)| (1.0 - d, w.powf(-0.5))).unzip();
-        Profile { time_d, first_velocity_kms, step_kms, intensity, sigma }
+        Profile { time_d, first_velocity_kms, step_kms, intensity, sigma, exposure_s: None }
     });
     Observations { profiles: profiles.collect() }
 }

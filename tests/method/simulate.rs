@@ -173,6 +173,7 @@ fn a_shifted_line_has_a_shifted_first_moment() {
         step_kms: 1.0,
         intensity: (0..61).map(|j| 1.0 - 0.4 * (-0.5 * ((f64::from(j) - 30.0 - shift) / 4.0).powi(2)).exp()).collect(),
         sigma: vec![1e-3; 61],
+        exposure_s: None,
     };
     for shift in [-3.0, 0.0, 0.123] {
         // a sampled Gaussian has the moments of the Gaussian; what its tail of 6.7 sigma lacks is below 1e-8

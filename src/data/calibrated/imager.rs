@@ -5,8 +5,9 @@ use super::seasons::with_seasons;
 use super::strength::star_for;
 use crate::data::config::{ConfigError, DataSetSettings, Settings, VelocityDrift, ZeroPoint};
 use crate::data::io::provenance::Season;
+use crate::numerics::units::SECONDS_PER_DAY;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
-use crate::star::observation::Observations;
+use crate::star::observation::{Observations, Profile};
 use crate::star::{Sampling, Seen, StarSettings};
 use crate::surface::calibration::offsets;
 use crate::surface::calibration::offsets::HeldZeroPoint;
@@ -38,8 +39,14 @@ pub fn imager(
         regions: set.regions,
         sampling: Sampling::of(part),
         own_maps: Vec::new(),
+        exposures: Vec::new(),
     };
-    let seen: Vec<Seen> = stars.iter().zip(sets).zip(parts).map(seen).collect();
+    let mut seen: Vec<Seen> = stars.iter().zip(sets).zip(parts).map(seen).collect();
+    for (set, part) in seen.iter_mut().zip(parts) {
+        let length_d = |profile: &Profile| profile.exposure_s.map_or(0.0, |seconds| seconds / SECONDS_PER_DAY);
+        let lengths_d: Vec<f64> = part.profiles.iter().map(length_d).collect();
+        set.exposures = set.exposures(&star, &settings.values.state(), &lengths_d);
+    }
     let all = Observations::joined(parts.to_vec());
     let imager = Imager::of_sets(star, seen, &all, settings.imaging.pixels, settings.imaging.entropy());
     if let Some(fwhm_kms) = too_wide_kms(&imager, &imager.star) {

@@ -6,7 +6,7 @@ use crate::data::io::light_curve::{Measurements, fitting};
 use crate::field::Lifetime;
 use crate::model::Parameter;
 use crate::star::observation::Observations;
-use crate::surface::photometry::{Flux, FluxBin, LightCurve, bin_width_d, outliers};
+use crate::surface::photometry::{Flux, LightCurve, bin_width_d, outliers};
 use sha2::{Digest, Sha256};
 use std::ops::Range;
 
@@ -133,33 +133,46 @@ pub(super) fn near(
     parts: &[Observations],
     all: &[Binned],
 ) -> Result<Vec<LightCurve>, ConfigError> {
-    let lifetime_d = match settings.known_field().lifetime {
-        Some(Lifetime::Static) => f64::INFINITY,
-        Some(Lifetime::Days(days)) => days,
-        None => Parameter::SpotLifetime.usual(),
-    };
-    let times_d: Vec<f64> = parts.iter().flat_map(Observations::times_d).collect();
     for (curve, Binned { curve: binned, .. }) in settings.light_curves.iter().zip(all) {
-        let away = |bin: &FluxBin| times_d.iter().map(|t| (t - bin.time_d).abs()).fold(f64::INFINITY, f64::min);
-        let nearest = binned.bins.iter().map(away).fold(f64::INFINITY, f64::min);
-        if nearest > FORGOTTEN * lifetime_d {
-            let [first, last] = [binned.bins[0].time_d, binned.bins[binned.bins.len() - 1].time_d];
-            let of_bins: Vec<f64> = binned.bins.iter().map(|bin| bin.time_d).collect();
-            let cure = match fitting(&of_bins, &times_d, FORGOTTEN * lifetime_d) {
-                Some(([own, other], add)) => format!(
-                    ". They fit if they are {own} and those of the profiles {other}: then add {add} to them, or give \
-                     the column of times its name"
-                ),
-                None => String::new(),
-            };
-            let problem = format!(
-                "its times, {first:.2} to {last:.2} d, are {nearest:.0} d or more from any profile, and spots do not \
-                 live that long; use one time system for both{cure}"
-            );
+        let of_bins: Vec<f64> = binned.bins.iter().map(|bin| bin.time_d).collect();
+        if let Some(problem) = far_from_profiles(settings, parts, &of_bins) {
             return Err(settings.fault(&curve.key, &problem));
         }
     }
     Ok(all.iter().map(|binned| binned.curve.clone()).collect())
+}
+
+/// For how long (d) spots know of themselves.
+pub(super) fn remembered_d(settings: &Settings) -> f64 {
+    FORGOTTEN
+        * match settings.known_field().lifetime {
+            Some(Lifetime::Static) => f64::INFINITY,
+            Some(Lifetime::Days(days)) => days,
+            None => Parameter::SpotLifetime.usual(),
+        }
+}
+
+/// That times (d), in their order, are all so far from those of the profiles that no spot lives that long.
+pub(super) fn far_from_profiles(settings: &Settings, parts: &[Observations], of_bins: &[f64]) -> Option<String> {
+    let remembered_d = remembered_d(settings);
+    let times_d: Vec<f64> = parts.iter().flat_map(Observations::times_d).collect();
+    let away = |time_d: &f64| times_d.iter().map(|t| (t - time_d).abs()).fold(f64::INFINITY, f64::min);
+    let nearest = of_bins.iter().map(away).fold(f64::INFINITY, f64::min);
+    if nearest <= remembered_d {
+        return None;
+    }
+    let [first, last] = [of_bins.first()?, of_bins.last()?];
+    let cure = match fitting(of_bins, &times_d, remembered_d) {
+        Some(([own, other], add)) => format!(
+            ". They fit if they are {own} and those of the profiles {other}: then add {add} to them, or give the \
+            column of times its name"
+        ),
+        None => String::new(),
+    };
+    Some(format!(
+        "its times, {first:.2} to {last:.2} d, are {nearest:.0} d or more from any profile, and spots do not live that \
+        long; use one time system for both{cure}"
+    ))
 }
 
 impl Binned {

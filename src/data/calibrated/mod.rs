@@ -4,6 +4,7 @@
 
 mod errors;
 mod imager;
+mod indicators;
 mod light_curves;
 mod seasons;
 mod strength;
@@ -21,6 +22,7 @@ use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::target;
 use crate::surface::calibration::target::ChosenTarget;
 use crate::surface::imaging::Imager;
+use crate::surface::photometry::Flux;
 use light_curves::Binned;
 use sha2::{Digest, Sha256};
 
@@ -36,8 +38,10 @@ pub struct Calibrated {
     /// Target chi2 per datum, of which noise that several bins share makes fewer; where the config leaves it to the
     /// observations it is measured.
     pub chi2_target: f64,
-    /// What they are imaged with.
+    /// What they are imaged with; indicators come in once they are fitted.
     pub imager: Imager,
+    /// The values of each indicator, in the order of time.
+    pub indicators: Vec<Vec<Flux>>,
 }
 
 impl Calibrated {
@@ -74,8 +78,10 @@ impl Calibrated {
         let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
         let remarks = remarks(settings, data);
         let mut held = imager::hold_offsets(settings, &mut imager, &suspects(&remarks))?.into_iter();
+        let (indicators, indicator_notes) = indicators::used(settings, &parts, &data.indicators)?;
         let mut measured = Measured {
             profiles: remarks,
+            indicator_notes,
             velocity_jitter,
             seasons: if seasons.len() > 1 { seasons } else { Vec::new() },
             light_curves: light_curves.iter().map(Binned::line).collect(),
@@ -96,8 +102,9 @@ impl Calibrated {
                 measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
             }
         }
-        let sha256 = light_curves::fingerprint(sha256, &light_curves);
-        Ok(Calibrated { observations: Observations::joined(parts), sha256, measured, chi2_target, imager })
+        let sha256 = indicators::fingerprint(light_curves::fingerprint(sha256, &light_curves), &indicators);
+        let observations = Observations::joined(parts);
+        Ok(Calibrated { observations, sha256, measured, chi2_target, imager, indicators })
     }
 
     /// The same where the profiles are others than those that it was measured on, of the same star at the same times
@@ -109,6 +116,7 @@ impl Calibrated {
         let parts = of_sets(&self.imager, &self.observations);
         let mut imager = imager(settings, &settings.sets, &parts, &self.measured.seasons)?;
         imager.light_curves = self.imager.light_curves;
+        imager.indicators = self.imager.indicators;
         imager.data.correlated_bins = self.imager.data.correlated_bins;
         let jitter = self.measured.velocity_jitter.as_ref().map(|measured| VelocityJitter::Number(measured.value_kms));
         let jitter = jitter.unwrap_or(settings.velocity_jitter);
@@ -127,15 +135,17 @@ pub fn of_sets(imager: &Imager, observations: &Observations) -> Vec<Observations
 }
 
 /// The profiles of a `set` within its velocity range, in units of their continuum, errors times the factor of the
-/// config.
+/// config, with its exposure time where they have none.
 fn used(set: &DataSetSettings, profiles: &ProfileSet) -> Result<Observations, LsdError> {
-    match set.source {
+    let mut used = match set.source {
         ObservationSource::Files { velocity_range_kms, sigma_scale, continuum_level, .. } => {
             let observations = profiles.within(velocity_range_kms, sigma_scale)?;
-            Ok(if continuum_level == 1.0 { observations } else { observations.over_continuum(continuum_level) })
+            if continuum_level == 1.0 { observations } else { observations.over_continuum(continuum_level) }
         }
-        ObservationSource::Simulate(_) => Ok(profiles.observations.clone()),
-    }
+        ObservationSource::Simulate(_) => profiles.observations.clone(),
+    };
+    used.profiles.iter_mut().for_each(|profile| profile.exposure_s = profile.exposure_s.or(set.exposure_s));
+    Ok(used)
 }
 
 /// What a reader of results must know of the files.
@@ -181,7 +191,7 @@ fn correlated_bins(parts: &[Observations], errors: &[Option<MeasuredErrors>]) ->
 }
 
 /// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of
-/// bins, and velocity, intensity and sigma of each bin.
+/// bins, exposure time where it is known, and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
     let step = observations.step_kms();
     let mut hash = Sha256::new();
@@ -189,6 +199,9 @@ pub fn fingerprint(observations: &Observations) -> String {
     for profile in &observations.profiles {
         hash.update(profile.time_d.to_le_bytes());
         hash.update((profile.intensity.len() as u64).to_le_bytes());
+        if let Some(exposure_s) = profile.exposure_s {
+            hash.update(exposure_s.to_le_bytes());
+        }
         for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
             for number in [profile.velocity_kms(j), *intensity, *sigma] {
                 hash.update(number.to_le_bytes());

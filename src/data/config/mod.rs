@@ -21,7 +21,8 @@ pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use instruments::{SPECTROGRAPHS, Spectrograph};
 pub use settings::{
-    DataSetSettings, FITTED, GridSettings, LightCurveSettings, LightSource, MOST_NODES, ObservationSource, Settings,
+    DataSetSettings, FITTED, GridSettings, IndicatorSettings, LightCurveSettings, LightSource, MOST_NODES,
+    ObservationSource, Settings, too_long,
 };
 pub use written::{
     Automatic, EquivalentWidth, EventWindows, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection,

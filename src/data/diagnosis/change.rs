@@ -298,6 +298,7 @@ fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
             step_kms: step,
             intensity: bins.iter().map(|&j| profile.intensity[j]).collect(),
             sigma: bins.iter().map(|&j| scale * profile.sigma[j]).collect(),
+            exposure_s: used.exposure_s,
         })
     };
     let profiles = source.profiles.iter().zip(&patient.observations.profiles).map(cut).collect::<Option<Vec<_>>>()?;

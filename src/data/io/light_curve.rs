@@ -7,7 +7,7 @@ use super::atomic::{WriteError, write};
 use super::table::{self, NotText, Row, Table};
 use super::{FileError, csv, outweighs};
 use crate::surface::photometry::Flux;
-use columns::{Brightness, Columns};
+use columns::{Brightness, Columns, Of};
 use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 
@@ -55,9 +55,21 @@ enum Unused {
 /// [`FileError`]: a file that cannot be read, lacks a column that is needed, or has numbers that are none of a light
 /// curve.
 pub fn read(path: &Path) -> Result<Measurements, FileError> {
+    read_table(path, Of::LightCurve)
+}
+
+/// Reads the values of an activity indicator, which are in place of fluxes.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_indicator(path: &Path) -> Result<Measurements, FileError> {
+    read_table(path, Of::Indicator)
+}
+
+fn read_table(path: &Path, of: Of) -> Result<Measurements, FileError> {
     let bytes = std::fs::read(path).map_err(|source| FileError::Read { path: path.into(), source })?;
     let text = table::text(&bytes).map_err(|what| FileError::of(path, no_text(what, path)))?;
-    parse(&text).map_err(|(line, problem)| match line {
+    parse(&text, of).map_err(|(line, problem)| match line {
         0 => FileError::of(path, problem),
         line => FileError::Line { path: path.into(), line, problem },
     })
@@ -80,10 +92,10 @@ fn no_text(what: NotText, path: &Path) -> String {
 }
 
 /// Reads the text of a table; a problem has its line, or 0.
-fn parse(text: &str) -> Result<Measurements, (usize, String)> {
+fn parse(text: &str, of: Of) -> Result<Measurements, (usize, String)> {
     let table = Table::of(text);
     let Some(first) = table.rows.first() else { return Err((0, "the table has no row of numbers".into())) };
-    let columns = Columns::of(&table, text).map_err(|problem| (0, problem))?;
+    let columns = Columns::of(&table, text, of).map_err(|problem| (0, problem))?;
     let is_used = |row: &&Row| !columns.flag.is_some_and(|flag| columns::is_flagged(row.cell(flag)));
     if let Some(band) = columns.band {
         one_band(&columns, table.rows.iter().filter(is_used).map(|row| row.cell(band)))?;
@@ -155,7 +167,7 @@ fn parse(text: &str) -> Result<Measurements, (usize, String)> {
     if columns.brightness == Brightness::Magnitude {
         remarks.push(format!("magnitudes, converted to fluxes in units of that at {median:.3} mag"));
         rows.iter_mut().for_each(|row| *row = flux_of(*row, median));
-    } else if !columns.has_unit {
+    } else if columns.brightness == Brightness::Flux && !columns.has_unit {
         let span = values[values.len() * 19 / 20] - values[values.len() / 20];
         let is_there = (LIKE_MAGNITUDES[0]..=LIKE_MAGNITUDES[1]).contains(&median) && span < SPAN_OF_MAGNITUDES;
         if is_there {
@@ -193,7 +205,7 @@ fn numbers(row: &Row, columns: &Columns) -> Result<[f64; 3], Unused> {
         }
     };
     let values = match columns.brightness {
-        Brightness::Flux => [-LARGEST[1], LARGEST[1]],
+        Brightness::Flux | Brightness::Indicator => [-LARGEST[1], LARGEST[1]],
         Brightness::Magnitude => MAGNITUDES,
     };
     let positive = [f64::MIN_POSITIVE, LARGEST[1]];
@@ -255,13 +267,13 @@ mod tests {
 
     /// Times and fluxes that are read, and remarks.
     fn read(text: &str) -> (Vec<(f64, f64)>, Vec<String>) {
-        let Measurements { fluxes, remarks, .. } = parse(text).unwrap();
+        let Measurements { fluxes, remarks, .. } = parse(text, Of::LightCurve).unwrap();
         assert!(fluxes.iter().all(|one| (one.sigma - 0.5e-3).abs() < 1e-9), "{fluxes:?}");
         (fluxes.iter().map(|one| (one.time_d, one.flux)).collect(), remarks)
     }
 
     fn refusal(text: &str, parts: &[&str]) {
-        let (line, problem) = parse(text).unwrap_err();
+        let (line, problem) = parse(text, Of::LightCurve).unwrap_err();
         let said = format!("line {line}: {problem}");
         assert!(parts.iter().all(|part| said.contains(part)), "{said}");
     }
@@ -312,7 +324,7 @@ mod tests {
         for name in ["mag,mag_err", "Magnitude,Uncertainty", "Vmag,e_Vmag"] {
             let text =
                 format!("HJD,{name}\n9000.5,11.2,0.01\n9000.6,>15.5,99.99\n9000.7,11.3,0.01\n9000.8,11.4,0.01\n");
-            let Measurements { fluxes, remarks, .. } = parse(&text).unwrap();
+            let Measurements { fluxes, remarks, .. } = parse(&text, Of::LightCurve).unwrap();
             let [first, middle] = [fluxes[0], fluxes[1]];
             assert!((first.flux / middle.flux - 10f64.powf(0.04)).abs() < 1e-12 && middle.flux == 1.0);
             assert!((middle.sigma - 0.009_210_34).abs() < 1e-7, "{middle:?}");
@@ -320,8 +332,8 @@ mod tests {
         }
         let numbers = "\n9000.5,11.2,0.01\n9000.6,11.3,0.01\n";
         refusal(&format!("time,flux,sigma{numbers}"), &["flux", "11.2 to 11.3", "magnitudes", "mag", "mJy"]);
-        assert_eq!(parse(&format!("time,flux (mJy),sigma{numbers}")).unwrap().fluxes[0].flux, 11.2);
-        assert_eq!(parse(&format!("time,flux_mjy,sigma{numbers}")).unwrap().fluxes[0].flux, 11.2);
+        assert_eq!(parse(&format!("time,flux (mJy),sigma{numbers}"), Of::LightCurve).unwrap().fluxes[0].flux, 11.2);
+        assert_eq!(parse(&format!("time,flux_mjy,sigma{numbers}"), Of::LightCurve).unwrap().fluxes[0].flux, 11.2);
         // instrumental ones, and changes of the flux
         refusal("time,flux,sigma\n1,-7.2,0.1\n2,-7.1,0.1\n", &["line 2", "-7.2 must be above 0", "mag"]);
         refusal("time,flux,sigma\n1,0.02,0.1\n2,-0.01,0.1\n", &["line 3", "Add them to 1"]);
@@ -329,7 +341,7 @@ mod tests {
 
     #[test]
     fn zero_points_are_read_from_names() {
-        let zero = |name: &str| parse(&format!("{name},flux,sigma\n9000.5,1,0.1\n")).unwrap().zero_jd;
+        let zero = |name: &str| parse(&format!("{name},flux,sigma\n9000.5,1,0.1\n"), Of::LightCurve).unwrap().zero_jd;
         for name in ["btjd", "BTJD", "time (BTJD)", "BJD - 2457000", "time_btjd", "Time [BJD-2457000]"] {
             assert_eq!(zero(name), Some(2_457_000.0), "{name}");
         }
@@ -339,6 +351,25 @@ mod tests {
         );
         assert_eq!(["time", "BJD_TDB", "JD", "time (d)"].map(zero), [None; 4]);
         refusal("time (s),flux,sigma\n1,1,0.1\n", &["time (s)", "days"]);
+    }
+
+    #[test]
+    fn indicators_have_values_of_either_sign_by_any_name() {
+        for text in [
+            "time,value,sigma\n9000.5,-0.25,0.1\n9000.6,12,0.1\n",
+            "BJD;S_MW;e_S_MW\n9000.5;-0.25;0.1\n9000.6;12;0.1\n",
+            "# run 2\nmjd\tBl (G)\tsigma\tflag\n9000.5\t-0.25\t0.1\t0\n9000.55\t9\t0.1\t1\n9000.6\t12\t0.1\t0\n",
+            "jd err halpha\n9000.6 0.1 12\n9000.5 0.1 -0.25\n",
+            "9000.5 -0.25 0.1\n9000.6 12 0.1\n",
+        ] {
+            let Measurements { fluxes, .. } = parse(text, Of::Indicator).unwrap();
+            let found: Vec<[f64; 3]> = fluxes.iter().map(|one| [one.time_d, one.flux, one.sigma]).collect();
+            assert_eq!(found, [[9000.5, -0.25, 0.1], [9000.6, 12.0, 0.1]], "{text}");
+        }
+        let several = parse("time,halpha,halpha_err,bis\n1,2,0.1,3\n", Of::Indicator).unwrap();
+        assert_eq!((several.fluxes[0].flux, &*several.remarks[0]), (2.0, "its value is the column halpha, not bis"));
+        let (line, problem) = parse("time,halpha\n1,2\n", Of::Indicator).unwrap_err();
+        assert!(line == 0 && problem.contains("no column sigma (the error of halpha)"), "{problem}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and
-//! the LSD profiles it names, relative to its folder (`layout` has their formats).
+//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment;
+//! columns that are named may hold exposure times, too), and the LSD profiles it names, relative to its folder
+//! (`layout` has their formats).
 //!
 //! Times are days of one count (`times`). VRAD is subtracted from the velocity axis; profiles are read in their whole
 //! width but for bad bins, which may lie beside the velocities that are used, errors as quoted. All are on the bins of
@@ -158,6 +159,7 @@ fn read_entries(
             step_kms: axis.step,
             intensity: raw.intensity[used.clone()].to_vec(),
             sigma: raw.sigma[used].to_vec(),
+            exposure_s: entry.exposure_s,
         });
     }
     match profiles.is_empty() {

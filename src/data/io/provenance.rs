@@ -7,7 +7,7 @@ use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::star::MeasuredStar;
 use crate::surface::calibration::target::ChosenTarget;
-use crate::surface::{ConstantVelocity, FieldStart, FittedContrast, OtherRotation};
+use crate::surface::{ConstantVelocity, FieldStart, FittedContrast, FittedIndicator, OtherRotation};
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.
@@ -50,6 +50,12 @@ pub struct Measured {
     /// What was left out of the light curves and converted, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curve_notes: Vec<String>,
+    /// `indicators`: gains and jitters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub indicators: Vec<FittedIndicator>,
+    /// What was made of the indicators on reading, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub indicator_notes: Vec<String>,
     /// `star.regions`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub star: Option<MeasuredStar>,
@@ -179,10 +185,13 @@ impl Measured {
         let seasons = self.seasons.iter().map(season);
         let light =
             self.light_curves.iter().chain(&self.light_curve_notes).map(|remark| ("light curve", remark.clone()));
+        let of_indicators = self.indicators.iter().map(FittedIndicator::line);
+        let indicators = self.indicator_notes.iter().cloned().chain(of_indicators).map(|text| ("indicator", text));
         profiles
             .chain(sets)
             .chain(seasons)
             .chain(light)
+            .chain(indicators)
             .chain(errors)
             .chain(jitter)
             .chain(star)

@@ -129,6 +129,9 @@ impl Campaign {
         if let Some(curve) = settings.light_curves.first() {
             return Err(own.fault(&curve.key, "light curves are not planned: delete it").into());
         }
+        if let Some(indicator) = settings.indicators.first() {
+            return Err(own.fault(&indicator.key, "activity indicators are not planned: delete it").into());
+        }
         let simulated = matches!(set.source, ObservationSource::Simulate(_));
         let taken = match (&settings.plan, simulated) {
             (None, true) => None,

@@ -1,9 +1,10 @@
 //! What the profiles say of themselves before anything else: line, continuum and vsini ([`first_look`]), how large
-//! their uncertainties are ([`noise`]), the RV jitter ([`jitter`]), RV offsets between data sets ([`offsets`]), and the
-//! target chi2 ([`target`]).
+//! their uncertainties are ([`noise`]), the RV jitter ([`jitter`]), RV offsets between data sets ([`offsets`]), the
+//! target chi2 ([`target`]), and what activity indicators have to do with the spots ([`indicators`]).
 
 pub mod events;
 pub mod first_look;
+pub mod indicators;
 pub mod jitter;
 pub mod noise;
 pub mod offsets;

@@ -135,7 +135,8 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
 fn moments(imager: &Imager, depths: &[f64]) -> Vec<f64> {
     let mut first = 0;
     let moment = |(step_kms, (time_d, first_velocity_kms, bins)): (f64, (f64, f64, usize))| {
-        let profile = Profile { time_d, first_velocity_kms, step_kms, intensity: Vec::new(), sigma: Vec::new() };
+        let (intensity, sigma) = (Vec::new(), Vec::new());
+        let profile = Profile { time_d, first_velocity_kms, step_kms, intensity, sigma, exposure_s: None };
         first += bins;
         profile.first_moment_of(&depths[first - bins..first])
     };

@@ -5,6 +5,7 @@
 //! that times a level and a slope of the segment, to first order `1 + J c + level + slope place`: two numbers that all
 //! bins of a segment have in common, integrated out.
 
+use super::indicators;
 use super::{Basis, MEAN_FILLING, Marginal};
 use crate::field::Epoch;
 use crate::model::Parameter;
@@ -25,6 +26,8 @@ pub const LEVEL: f64 = 0.1;
 pub(super) struct Light {
     /// J (bins, H), those of all light curves one after the other.
     jacobian: DMatrix<f64>,
+    /// The same of the readings of indicators (readings, H).
+    of_indicators: DMatrix<f64>,
 }
 
 /// A bin of a light curve and what the most probable maps make of it.
@@ -55,27 +58,31 @@ impl Light {
         };
         let rows: Vec<Vec<f64>> = bins.par_iter().map(shares).collect();
         let rows = DMatrix::from_iterator(imager.grid.len(), bins.len(), rows.into_iter().flatten());
-        Light { jacobian: rows.transpose() * &basis.on_pixels }
+        let of_indicators = indicators::jacobian(imager, basis, state);
+        Light { jacobian: rows.transpose() * &basis.on_pixels, of_indicators }
     }
 
-    /// Number of bins.
-    pub fn len(&self) -> usize {
-        self.jacobian.nrows()
-    }
-
-    /// `J^T N^-1 J` of all bins for the harmonics `of` one degree (harmonics, harmonics).
+    /// `J^T N^-1 J` of all bins and readings for the harmonics `of` one degree (harmonics, harmonics).
     pub fn information(&self, imager: &Imager, of: Range<usize>) -> DMatrix<f64> {
-        let mut rows = self.jacobian.columns_range(of).into_owned();
+        let mut rows = self.jacobian.columns_range(of.clone()).into_owned();
         let bins = imager.light_curves.iter().flat_map(|curve| &curve.bins);
         rows.row_iter_mut().zip(bins).for_each(|(mut row, bin)| row /= bin.sigma);
-        rows.tr_mul(&rows)
+        let information = rows.tr_mul(&rows);
+        if imager.indicators.is_empty() {
+            return information;
+        }
+        let mut more = self.of_indicators.columns_range(of).into_owned();
+        let readings = imager.indicators.iter().flat_map(|indicator| &indicator.readings);
+        more.row_iter_mut().zip(readings).for_each(|(mut row, reading)| row /= reading.sigma);
+        information + more.tr_mul(&more)
     }
 
-    /// The bins around maps of these coefficients (H, bins), without slopes.
+    /// The bins, then the readings, around maps of these coefficients (H, bins and readings), without slopes.
     pub fn epochs(&self, imager: &Imager, maps: DMatrixView<f64>) -> Vec<Epoch> {
-        let numbers = 2 * imager.light_curves.iter().map(|curve| curve.segments).sum::<usize>();
+        let of_curves = 2 * imager.light_curves.iter().map(|curve| curve.segments).sum::<usize>();
+        let numbers = of_curves + 2 * imager.indicators.len();
         let fluxes = self.fluxes(maps);
-        let mut epochs = Vec::with_capacity(self.len());
+        let mut epochs = Vec::with_capacity(fluxes.len());
         let mut first = 0;
         for curve in &imager.light_curves {
             for bin in &curve.bins {
@@ -97,12 +104,19 @@ impl Light {
             }
             first += 2 * curve.segments;
         }
+        let readings = &fluxes.as_slice()[self.jacobian.nrows()..];
+        epochs.extend(indicators::epochs(imager, &self.of_indicators, readings, of_curves));
         epochs
     }
 
-    /// Flux of each bin, before level and slope.
+    /// Flux of each bin, and then what spots do to each reading, before level and slope.
     fn fluxes(&self, maps: DMatrixView<f64>) -> DVector<f64> {
-        DVector::from_fn(self.len(), |k, _| 1.0 + self.jacobian.row(k).transpose().dot(&maps.column(k)))
+        let bins = self.jacobian.nrows();
+        let seen = |rows: &DMatrix<f64>, k: usize, map: usize| rows.row(k).transpose().dot(&maps.column(map));
+        DVector::from_fn(bins + self.of_indicators.nrows(), |k, _| match k < bins {
+            true => 1.0 + seen(&self.jacobian, k, k),
+            false => seen(&self.of_indicators, k - bins, k),
+        })
     }
 }
 

@@ -13,7 +13,8 @@
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
 //! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 //! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
-//! 9. `absorbing`: fields that absorb more of an orbit that is not in the model, for detection limits.
+//! 9. [`fit_indicator`]: what activity indicators have to do with the spots; those that have are epochs, too.
+//! 10. `absorbing`: fields that absorb more of an orbit that is not in the model, for detection limits.
 
 mod absorbing;
 mod basis;
@@ -27,6 +28,7 @@ pub mod events;
 mod expand;
 pub(in crate::surface) mod fit;
 mod forecast;
+mod indicators;
 mod known;
 mod light;
 pub(in crate::surface) mod linearised;
@@ -45,6 +47,7 @@ pub use change::Change;
 pub use design::Design;
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
+pub use indicators::{FittedIndicator, fit_indicator};
 pub use known::{FieldStart, Known, LARGEST_AMPLITUDE};
 pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;

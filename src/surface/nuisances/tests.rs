@@ -12,6 +12,7 @@ fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
         step_kms: 2.0,
         intensity: (0..20).map(|j| 1.0 - depth(j) + 0.01 * (phase + j as f64).sin()).collect(),
         sigma: (0..20).map(|j| 1e-3 * (1.5 + (0.7 * j as f64 + phase).cos())).collect(),
+        exposure_s: None,
     }
 }
 

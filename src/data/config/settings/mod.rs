@@ -4,6 +4,7 @@
 mod checks;
 mod grid;
 mod imaging;
+mod indicators;
 mod observations;
 mod orbits;
 mod parameters;
@@ -12,7 +13,8 @@ mod simulation;
 mod star;
 
 pub use grid::{GridSettings, MOST_NODES};
-pub use observations::{DataSetSettings, ObservationSource};
+pub use indicators::IndicatorSettings;
+pub use observations::{DataSetSettings, ObservationSource, too_long};
 pub use photometry::{LightCurveSettings, LightSource};
 pub use star::FITTED;
 
@@ -27,6 +29,7 @@ use crate::star::{BrightnessModel, Size, StarSettings};
 use crate::surface::Known;
 use grid::resolve_grid;
 use imaging::{check_brightness, check_imaging, resolve_field};
+use indicators::resolve_indicators;
 use observations::{has_own_jitters, largest_jitter_kms, resolve_sets};
 use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
@@ -56,6 +59,8 @@ pub struct Settings {
     pub sets: Vec<DataSetSettings>,
     /// The light curves, mostly none.
     pub light_curves: Vec<LightCurveSettings>,
+    /// The activity indicators, mostly none.
+    pub indicators: Vec<IndicatorSettings>,
     /// What is planned beside them.
     pub plan: Option<PlanSection>,
     /// Scatter of the profiles' velocity zero points.
@@ -93,6 +98,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
     check_brightness(&mut written.imaging)?;
     let sets = resolve_sets(&mut written, &star, &values, path)?;
     let light_curves = resolve_photometry(&written, path)?;
+    let indicators = resolve_indicators(&written, path)?;
     let velocity_jitter = resolve_jitter(&mut written);
     check_imaging(&written.imaging, velocity_jitter)?;
     resolve_field(&mut written, &mut values)?;
@@ -128,6 +134,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         values,
         sets,
         light_curves,
+        indicators,
         plan: written.plan,
         velocity_jitter,
         imaging: written.imaging,
@@ -286,6 +293,7 @@ impl Settings {
             top.remove("$schema");
         }
         self.with_light_curves_from_here(&mut config);
+        self.with_indicators_from_here(&mut config);
         let sections = match &mut config["observations"] {
             serde_json::Value::Array(sections) => sections.iter_mut().collect(),
             one => vec![one],
@@ -313,6 +321,21 @@ impl Settings {
         match (tables.is_empty(), config.as_object_mut()) {
             (true, Some(top)) => drop(top.remove("photometry")),
             _ => config["photometry"] = tables.into(),
+        }
+    }
+
+    /// Tables of indicators by paths that hold from anywhere.
+    fn with_indicators_from_here(&self, config: &mut serde_json::Value) {
+        let sections = match config.get_mut("indicators") {
+            Some(serde_json::Value::Array(sections)) => sections.iter_mut().collect(),
+            Some(one) => vec![one],
+            None => return,
+        };
+        for (section, IndicatorSettings { path, .. }) in sections.into_iter().zip(&self.indicators) {
+            let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+            if let Some(path) = path.to_str() {
+                section["path"] = path.into();
+            }
         }
     }
 

@@ -11,6 +11,8 @@ use crate::data::config::written::{
 };
 use crate::data::simulate::Simulation;
 use crate::model::{Parameter, ParameterValues};
+use crate::numerics::units::SECONDS_PER_DAY;
+use crate::star::exposure::LONGEST_ROTATIONS;
 use crate::star::{BrightnessModel, LimbDarkening, Regions, StarSettings};
 use crate::surface::calibration::noise::ErrorSettings;
 use crate::surface::nuisances::LineAndContinuum;
@@ -45,6 +47,8 @@ pub struct DataSetSettings {
     pub night_jitter_kms: f64,
     /// Velocity that all profiles have too much.
     pub zero_point: ZeroPoint,
+    /// Exposure time (s) of profiles whose own is not known.
+    pub exposure_s: Option<f64>,
     /// Windows of time (d) whose profiles are left out.
     pub exclude: Vec<[f64; 2]>,
     /// What is known of profiles that the others do not predict; `None` where they are not looked for.
@@ -108,6 +112,9 @@ pub(super) fn resolve_sets(
         let star = star_of(written, s, &key, star, values)?;
         let section = &mut written.observations.sections[s];
         check_windows(&section.exclude, &format!("{key}.exclude"))?;
+        if let Some(problem) = section.exposure_s.and_then(|exposure_s| too_long(exposure_s, &star)) {
+            return Err(Fault::new(format!("{key}.exposure_s"), problem));
+        }
         let source = source(section, &key, &star, values, config)?;
         if let Some(priors) = &section.nuisances {
             check_nuisances(&format!("{key}.nuisances"), NUISANCES, priors)?;
@@ -141,6 +148,7 @@ pub(super) fn resolve_sets(
             source,
             nuisances: section.nuisances.or(written.imaging.nuisances),
             zero_point: section.zero_point_kms,
+            exposure_s: section.exposure_s,
             exclude: section.exclude.clone(),
             events: events(section.events.as_ref(), has_field, &key)?,
             key,
@@ -149,6 +157,22 @@ pub(super) fn resolve_sets(
     names(&sets.iter().map(|set| (&*set.key, &*set.name)).collect::<Vec<_>>())?;
     of_one_star(written, &mut sets)?;
     Ok(sets)
+}
+
+/// What is wrong with an exposure of this length (s), if anything is: one over which the model averages shows nearly
+/// the same side of the star all the time.
+pub fn too_long(exposure_s: f64, star: &StarSettings) -> Option<String> {
+    if !(exposure_s >= 0.0 && exposure_s.is_finite()) {
+        return Some(format!("{exposure_s} s must be 0 or more"));
+    }
+    let period_d = star.rotation_period_d;
+    let rotations = exposure_s / SECONDS_PER_DAY / period_d;
+    (rotations > LONGEST_ROTATIONS).then(|| {
+        format!(
+            "{exposure_s} s is {rotations:.4} of a rotation (star.rotation_period_d {period_d} d), at most \
+            {LONGEST_ROTATIONS} is modelled: give each exposure as one profile"
+        )
+    })
 }
 
 /// What is known of events, checked; they are looked for where maps evolve.
@@ -250,7 +274,8 @@ fn source(
             if star.line.equivalent_width_kms.is_none() {
                 return Err(Fault::new("star.line.equivalent_width_kms", "auto is for observations from files only"));
             }
-            return Ok(ObservationSource::Simulate(simulation(simulate, star, values, key)?));
+            let exposure_s = section.exposure_s;
+            return Ok(ObservationSource::Simulate(simulation(simulate, star, values, (key, exposure_s))?));
         }
         (Some(_), Some(_)) => return Err(Fault::new(key, "give either path or simulate, not both")),
         (None, None) => return Err(Fault::new(key, "give path (of the list of profiles) or simulate")),

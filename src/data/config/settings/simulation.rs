@@ -20,12 +20,13 @@ fn at(set: &str, field: &str) -> String {
     format!("{set}.simulate.{field}")
 }
 
-/// The simulation of the data set at the key `set`, of a `star` whose parameters have these `values`.
+/// The simulation of the data set at the key `set`, of a `star` whose parameters have these `values`, in exposures of
+/// that length (s) if one is given.
 pub(super) fn simulation(
     section: &SimulateSection,
     star: &StarSettings,
     values: &ParameterValues,
-    set: &str,
+    (set, exposure_s): (&str, Option<f64>),
 ) -> Result<Simulation, Fault> {
     let at = |field: &str| at(set, field);
     let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
@@ -74,6 +75,7 @@ pub(super) fn simulation(
         velocity_jitter_kms: section.velocity_jitter_kms,
         zero_point_kms: section.zero_point_kms,
         correlated_bins: section.correlated_bins,
+        exposure_s,
     })
 }
 

@@ -5,6 +5,7 @@
 //! `parameters`, of simulations and plans in `simulation`.
 
 mod imaging;
+mod indicators;
 mod listed;
 mod number_or;
 mod observations;
@@ -13,6 +14,7 @@ mod photometry;
 mod star;
 
 pub use imaging::ImagingSettings;
+pub use indicators::IndicatorSection;
 pub use listed::Listed;
 pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
 pub use observations::{EventWindows, EventsKey, EventsWord, ObservationsSection, SimulateSection, VelocitySection};
@@ -50,6 +52,11 @@ pub struct Config {
     /// Light curves of the star, with objective "marginal-likelihood": one, or a list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photometry: Option<Listed<PhotometrySection>>,
+    /// Activity indicators, with objective "marginal-likelihood": one, or a list. Each is `level + slope t + gain f(t)`
+    /// with the filling factor f of the visible disc; gain and jitter are fitted to the values, and an indicator
+    /// without a significant gain is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub indicators: Option<Listed<IndicatorSection>>,
     /// Profiles to be planned beside the observations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<PlanSection>,

@@ -29,9 +29,14 @@ pub struct ObservationsSection {
     /// The list of profiles, one `FILE TIME_DAYS [VRAD_KMS]` per line, relative to the folder of this config. Times are
     /// mid-exposure, in days, on one time system (preferably BJD_TDB, optionally with a constant offset). Velocities
     /// are barycentric, in the profiles or after subtraction of VRAD. Uncorrected, the Earth's motion of up to 30 km/s
-    /// mimics an orbit.
+    /// mimics an orbit. A first line that names the columns may name one of exposure times, `exposure_s`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
+    /// Exposure time (s) of the profiles for which the list has none: model profiles are averaged over the rotation in
+    /// it, where that moves a feature at the centre of the disc by more than a tenth of a velocity bin. At most a tenth
+    /// of a rotation. Simulated profiles are averaged, too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
     /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_range_kms: Option<[f64; 2]>,

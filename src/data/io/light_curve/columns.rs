@@ -2,11 +2,29 @@
 
 use crate::data::io::table::{self, Lines, Name, Table, readings};
 
-/// What a column of brightness holds.
+/// What a column of brightness holds, or that of the values of an activity indicator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Brightness {
     Flux,
     Magnitude,
+    Indicator,
+}
+
+/// What a table is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Of {
+    LightCurve,
+    Indicator,
+}
+
+impl Of {
+    /// The columns that are due.
+    fn columns(self) -> &'static str {
+        match self {
+            Of::LightCurve => "time, flux, sigma",
+            Of::Indicator => "time, value, sigma",
+        }
+    }
 }
 
 /// Names of times that are Julian dates, or days of whatever count; those before others are taken first.
@@ -145,7 +163,7 @@ impl Columns {
     ///
     /// # Errors
     /// What is missing.
-    pub fn of(table: &Table, text: &str) -> Result<Self, String> {
+    pub fn of(table: &Table, text: &str, of: Of) -> Result<Self, String> {
         let count = table.rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
         // rows without a flux may come first, which are no names, and rows whose last cell is empty look shorter
         let Lines { lines, comments } = Lines::of(text);
@@ -155,32 +173,43 @@ impl Columns {
         let others: Vec<Vec<Name>> = named.flat_map(of_line).collect();
         let mut first_problem = None;
         for names in table.names.iter().chain(&others) {
-            match Columns::named(names) {
+            let columns = match of {
+                Of::LightCurve => Columns::named(names),
+                Of::Indicator => Columns::of_indicator(names),
+            };
+            match columns {
                 Ok(columns) => return Ok(columns),
                 Err(problem) => drop(first_problem.get_or_insert(problem)),
             }
         }
         match first_problem {
-            None if count == 3 => Ok(Columns::unnamed()),
+            None if count == 3 => Ok(Columns::unnamed(of)),
             Some(problem) if table.names.iter().flatten().any(|name| !name.bare.is_empty()) => Err(problem),
-            _ => Err("no line of names: the first line must name the columns, time, flux, sigma among them".into()),
+            _ => {
+                let due = of.columns();
+                Err(format!("no line of names: the first line must name the columns, {due} among them"))
+            }
         }
     }
 
     /// The three of a table without names.
-    fn unnamed() -> Self {
+    fn unnamed(of: Of) -> Self {
         let name = |bare: &str| Name { written: bare.into(), bare: bare.into(), unit: String::new() };
+        let (value, brightness) = match of {
+            Of::LightCurve => ("flux", Brightness::Flux),
+            Of::Indicator => ("value", Brightness::Indicator),
+        };
         Columns {
-            names: ["time", "flux", "sigma"].map(name).to_vec(),
+            names: ["time", value, "sigma"].map(name).to_vec(),
             time: 0,
             value: 1,
             sigma: 2,
             flag: None,
             band: None,
-            brightness: Brightness::Flux,
+            brightness,
             has_unit: false,
             zero_jd: None,
-            remarks: vec!["no line of names: the columns are taken for time, flux, sigma".into()],
+            remarks: vec![format!("no line of names: the columns are taken for {}", of.columns())],
         }
     }
 
@@ -210,7 +239,7 @@ impl Columns {
         let own = OF_ERRORS.iter().flat_map(|error| [format!("{bare}{error}"), format!("{error}{bare}")]);
         let own: Vec<String> = own.collect();
         let of_other = |name: &str| match brightness {
-            Brightness::Flux => name.contains("mag"),
+            Brightness::Flux | Brightness::Indicator => name.contains("mag"),
             Brightness::Magnitude => name.contains("flux"),
         };
         let usual: Vec<&str> = ERRORS.into_iter().filter(|name| !of_other(name)).collect();
@@ -239,6 +268,53 @@ impl Columns {
             brightness,
             zero_jd,
             remarks,
+        })
+    }
+
+    /// Those of an activity indicator: its value is in the column `value`, or else in the first that is no time, error
+    /// or flag.
+    fn of_indicator(names: &[Name]) -> Result<Self, String> {
+        let missing = |what: &str| {
+            let written: Vec<&str> = names.iter().map(|name| name.written.as_str()).collect();
+            format!(
+                "no column {what} among {}: the first line must name the columns, time, value, sigma among them",
+                written.join(", ")
+            )
+        };
+        let time = time(names).ok_or_else(|| missing("time"))?;
+        let zero_jd = zero_jd(&names[time].bare).or_else(|| zero_jd(&names[time].unit));
+        if zero_jd.is_none() && !DAYS.contains(&names[time].unit.as_str()) {
+            return Err(format!("column {}: times must be in days", names[time].written));
+        }
+        let of_error = |of: &str| {
+            let own = |error: &&str| [format!("{of}{error}"), format!("{error}{of}")];
+            let own: Vec<String> = OF_ERRORS.iter().flat_map(own).collect();
+            names.iter().position(|name| own.contains(&name.bare))
+        };
+        let is_error = |k: usize| {
+            ERRORS.contains(&&*names[k].bare) || (0..names.len()).any(|other| of_error(&names[other].bare) == Some(k))
+        };
+        let is_other = |name: &Name| FLAGS.contains(&&*name.bare) || BANDS.contains(&&*name.bare);
+        let is_value = |k: &usize| *k != time && !is_error(*k) && !is_other(&names[*k]);
+        let plain = names.iter().position(|name| name.bare == "value");
+        let value = plain.or_else(|| (0..names.len()).find(is_value)).ok_or_else(|| missing("value"))?;
+        let usual = || ERRORS.iter().find_map(|error| names.iter().position(|name| name.bare == *error));
+        let sigma = of_error(&names[value].bare).or_else(usual).filter(|k| *k != value && *k != time);
+        let sigma = sigma.ok_or_else(|| missing(&format!("sigma (the error of {})", names[value].written)))?;
+        let others = (0..names.len()).filter(|k| *k != value && is_value(k)).map(|k| names[k].written.as_str());
+        let others: Vec<&str> = others.collect();
+        let remark = format!("its value is the column {}, not {}", names[value].written, others.join(", "));
+        Ok(Columns {
+            has_unit: true,
+            names: names.to_vec(),
+            time,
+            value,
+            sigma,
+            flag: names.iter().position(|name| FLAGS.contains(&&*name.bare)),
+            band: None,
+            brightness: Brightness::Indicator,
+            zero_jd,
+            remarks: if others.is_empty() { Vec::new() } else { vec![remark] },
         })
     }
 

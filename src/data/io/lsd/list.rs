@@ -1,5 +1,6 @@
 //! The list of profiles: `FILE TIME_DAYS [VRAD_KMS]` a line, between blanks, tabs, commas or semicolons; a file whose
-//! name holds blanks stands in quotes. A first line may name the columns.
+//! name holds blanks stands in quotes. A first line may name the columns, among them that of exposure times, for which
+//! a comment that names them does as well.
 
 use super::error::LsdError;
 use super::row::shown;
@@ -17,11 +18,13 @@ pub struct Label {
     pub path: Option<PathBuf>,
     /// Velocity that is subtracted from its axis (km/s).
     pub vrad_kms: f64,
+    /// The line of the list, from 1; 0 where there is no list.
+    pub line: usize,
 }
 
 impl From<Entry> for Label {
-    fn from(Entry { file, path, vrad_kms, .. }: Entry) -> Self {
-        Label { file, path: Some(path), vrad_kms }
+    fn from(Entry { line, file, path, vrad_kms, .. }: Entry) -> Self {
+        Label { file, path: Some(path), vrad_kms, line }
     }
 }
 
@@ -32,6 +35,7 @@ pub(super) struct Entry {
     pub path: PathBuf,
     pub time_d: f64,
     pub vrad_kms: f64,
+    pub exposure_s: Option<f64>,
 }
 
 /// The list at `list` and the profiles that it names, as far as it can be read.
@@ -45,15 +49,19 @@ pub(super) fn list_bytes(list: &Path) -> Result<Vec<u8>, LsdError> {
     std::fs::read(list).map_err(|source| FileError::Read { path: list.into(), source }.into())
 }
 
-/// Names of the columns that a first line may have, bare: file, time, velocity.
-const NAMES: [&[&str]; 3] = [
+/// Names of the columns that a first line may have, bare: file, time, velocity, exposure time (s).
+const NAMES: [&[&str]; 4] = [
     &["file", "files", "filename", "name", "path", "profile"],
     &["time", "timed", "timedays", "date", "jd", "bjd", "hjd", "mjd", "bjdtdb", "rjd", "rbjd"],
     &["vrad", "vradkms", "rv", "radialvelocity", "velocity"],
+    &["exposures", "exposure", "exposuretime", "exposuretimes", "exptime", "exptimes", "texp", "texps"],
 ];
 
-/// Where in a line the file, the time and the velocity stand.
-type Places = [usize; 3];
+/// Where in a line the file, the time, the velocity and the exposure time stand.
+type Places = [usize; 4];
+
+/// Where they stand in a line whose columns have no names: four are too many.
+const UNNAMED: Places = [0, 1, 2, usize::MAX];
 
 /// The lines of a list of that content.
 pub(super) fn parse_list(list: &Path, bytes: &[u8]) -> Result<Vec<Entry>, LsdError> {
@@ -64,56 +72,78 @@ pub(super) fn parse_list(list: &Path, bytes: &[u8]) -> Result<Vec<Entry>, LsdErr
     let (mut entries, mut places, mut is_first) = (Vec::new(), None, true);
     for (line, text) in text.lines().enumerate().map(|(k, text)| (k + 1, text)) {
         if Separator::Blanks.cells(text).is_empty() {
+            if let Some(comment) = text.trim_start().strip_prefix('#').filter(|_| is_first) {
+                places = named(comment, true).or(places);
+            }
             continue;
         }
-        if std::mem::take(&mut is_first) {
-            places = named(text);
-            if places.is_some() {
-                continue;
-            }
+        if std::mem::take(&mut is_first)
+            && let Some(names) = named(text, false)
+        {
+            places = Some(names);
+            continue;
         }
-        let (file, time_d, vrad_kms) =
-            read(text, places).map_err(|problem| FileError::Line { path: list.into(), line, problem })?;
-        entries.push(Entry { line, file: file.to_owned(), path: folder.join(file), time_d, vrad_kms });
+        let fault = |problem| FileError::Line { path: list.into(), line, problem };
+        let Row { file, time_d, vrad_kms, exposure_s } = read(text, places).map_err(fault)?;
+        entries.push(Entry { line, file: file.to_owned(), path: folder.join(file), time_d, vrad_kms, exposure_s });
     }
     Ok(entries)
 }
 
 const SEPARATORS: [Separator; 4] = [Separator::Blanks, Separator::Tab, Separator::Comma, Separator::Semicolon];
 
-/// The places of the columns, if a line names them.
-fn named(line: &str) -> Option<Places> {
+/// The places of the columns, if a line names them; if a comment does, it is names and nothing else, that of exposure
+/// times among them: comments above other lists are none.
+fn named(line: &str, is_comment: bool) -> Option<Places> {
     const MOST: usize = 12;
     (2..=MOST).flat_map(|columns| table::readings(line, columns)).find_map(|columns| {
+        let is_name = |bare: &str| NAMES.iter().any(|names| names.contains(&bare));
+        let is_exposure = |bare: &str| NAMES[3].contains(&bare);
+        if is_comment
+            && !(columns.iter().all(|column| is_name(&column.bare))
+                && columns.iter().any(|column| is_exposure(&column.bare)))
+        {
+            return None;
+        }
         let place = |names: &[&str]| columns.iter().position(|column| names.contains(&column.bare.as_str()));
-        Some([place(NAMES[0])?, place(NAMES[1])?, place(NAMES[2]).unwrap_or(usize::MAX)])
+        let or_none = |names: &[&str]| place(names).unwrap_or(usize::MAX);
+        Some([place(NAMES[0])?, place(NAMES[1])?, or_none(NAMES[2]), or_none(NAMES[3])])
     })
 }
 
-/// The file, the time and the velocity of a line, by the first separator that makes sense of it.
-fn read(line: &str, places: Option<Places>) -> Result<(&str, f64, f64), String> {
+/// What a line says.
+struct Row<'a> {
+    file: &'a str,
+    time_d: f64,
+    vrad_kms: f64,
+    exposure_s: Option<f64>,
+}
+
+/// What a line says, by the first separator that makes sense of it.
+fn read(line: &str, places: Option<Places>) -> Result<Row<'_>, String> {
     let blanks = entry(&Separator::Blanks.cells(line), places);
     let is_quoted = line.contains(['"', '\'']);
     let by_a_mark = || {
         let others = SEPARATORS.into_iter().skip(1).filter_map(|separator| {
-            let (file, time_d, vrad_kms) = entry(&separator.cells(line), places).ok()?;
+            let row = entry(&separator.cells(line), places).ok()?;
             // a comma within a number is no separator
-            let is_file = separator == Separator::Tab || is_quoted || !file.contains(char::is_whitespace);
-            is_file.then_some((file, time_d, vrad_kms))
+            let is_file = separator == Separator::Tab || is_quoted || !row.file.contains(char::is_whitespace);
+            is_file.then_some(row)
         });
         others.into_iter().next()
     };
     blanks.or_else(|problem| by_a_mark().ok_or(problem))
 }
 
-fn entry<'a>(cells: &[&'a str], places: Option<Places>) -> Result<(&'a str, f64, f64), String> {
-    let [file, time, vrad] = places.unwrap_or([0, 1, 2]).map(|place| cells.get(place).copied());
+fn entry<'a>(cells: &[&'a str], places: Option<Places>) -> Result<Row<'a>, String> {
+    let [file, time, vrad, exposure] = places.unwrap_or(UNNAMED).map(|place| cells.get(place).copied());
     let (Some(file), Some(time)) = (file, time) else {
         return Err(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due", cells.len()));
     };
     let quotes = if cells.len() > 2 { "; the name of a file with blanks stands in quotes" } else { "" };
     if places.is_none() && cells.len() > 3 {
-        return Err(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due{quotes}", cells.len()));
+        let names = "; a first line `# file time_d vrad_kms exposure_s` names more columns";
+        return Err(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due{quotes}{names}", cells.len()));
     }
     let finite = |name: &str, cell: &str, hint: &str| match number(cell) {
         Ok(value) if value.is_finite() => Ok(value),
@@ -121,5 +151,10 @@ fn entry<'a>(cells: &[&'a str], places: Option<Places>) -> Result<(&'a str, f64,
         _ => Err(format!("{name} {} is not a finite number{hint}", shown(cell))),
     };
     let time_d = finite("time", time, quotes)?;
-    Ok((file, time_d, vrad.map_or(Ok(0.0), |vrad| finite("radial velocity", vrad, ""))?))
+    let vrad_kms = vrad.map_or(Ok(0.0), |vrad| finite("radial velocity", vrad, ""))?;
+    let exposure_s = exposure.map(|exposure| match finite("exposure time", exposure, "")? {
+        exposure_s if exposure_s < 0.0 => Err(format!("exposure time {exposure_s} s must be 0 or more")),
+        exposure_s => Ok(exposure_s),
+    });
+    Ok(Row { file, time_d, vrad_kms, exposure_s: exposure_s.transpose()? })
 }

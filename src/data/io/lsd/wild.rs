@@ -82,6 +82,7 @@ mod tests {
                 step_kms: 2.0,
                 intensity: intensity.collect(),
                 sigma: vec![1e-3; 61],
+                exposure_s: None,
             }
         };
         let mut profiles: Vec<Profile> = (0..7).map(profile).collect();

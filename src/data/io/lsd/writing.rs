@@ -25,13 +25,18 @@ pub fn is_written(name: &str) -> bool {
 /// # Errors
 /// A file that cannot be written.
 pub fn write(folder: &Path, observations: &Observations) -> Result<(), WriteError> {
-    let mut list = String::from("# file  time_d\n");
+    let with_exposures = observations.profiles.iter().any(|profile| profile.exposure_s.is_some());
+    let mut list =
+        String::from(if with_exposures { "# file  time_d  vrad_kms  exposure_s\n" } else { "# file  time_d\n" });
     for (k, profile) in observations.profiles.iter().enumerate() {
         let name = format!("p{k:03}.prof");
         let title = format!("Synthetic Stokes I profile {k}");
         save(&folder.join(&name), &profile_text(&title, profile, 0.0))?;
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "{name} {}", profile.time_d);
+        let _ = match with_exposures {
+            true => writeln!(list, "{name} {} 0{}", profile.time_d, exposure(profile)),
+            false => writeln!(list, "{name} {}", profile.time_d),
+        };
     }
     save(&folder.join(LIST), &list)
 }
@@ -41,7 +46,7 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), WriteErro
 /// # Errors
 /// A file that cannot be written.
 pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
-    let label = |k: usize| Label { file: format!("profile {k}"), path: None, vrad_kms: 0.0 };
+    let label = |k: usize| Label { file: format!("profile {k}"), path: None, vrad_kms: 0.0, line: 0 };
     let labels: Vec<Label> = (0..observations.profiles.len()).map(label).collect();
     Ok(write_as(folder, observations, &labels, "from arrays")?)
 }
@@ -52,15 +57,22 @@ pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), L
 /// # Errors
 /// A file that cannot be written.
 pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], what: &str) -> Result<(), WriteError> {
-    let mut list = String::from("# file  time_d  vrad_kms\n");
+    let with_exposures = observations.profiles.iter().any(|profile| profile.exposure_s.is_some());
+    let mut list = String::from("# file  time_d  vrad_kms");
+    list.push_str(if with_exposures { "  exposure_s\n" } else { "\n" });
     for (k, (profile, Label { file, vrad_kms, .. })) in observations.profiles.iter().zip(labels).enumerate() {
         let name = format!("p{k:03}.prof");
         let title = format!("{file} {what}");
         save(&folder.join(&name), &profile_text(&title, profile, *vrad_kms))?;
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "{name} {} {vrad_kms}  # {file}", profile.time_d);
+        let _ = writeln!(list, "{name} {} {vrad_kms}{}  # {file}", profile.time_d, exposure(profile));
     }
     save(&folder.join(LIST), &list)
+}
+
+/// The last column of a line, where the exposure is known.
+fn exposure(profile: &Profile) -> String {
+    profile.exposure_s.map_or(String::new(), |exposure_s| format!(" {exposure_s}"))
 }
 
 fn profile_text(title: &str, profile: &Profile, vrad_kms: f64) -> String {
