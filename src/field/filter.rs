@@ -149,7 +149,7 @@ impl Spread {
         let (told, passage) = (self.told.take(), passage.filter(|_| rates > 0));
         let (told, passage) = (told.as_ref(), passage.as_ref());
         // columns of rates, of their values, and of what has no rate, a block of each at a time
-        let block = COLUMNS * states;
+        let block = (COLUMNS * states).max(1);
         let (of_rates, of_values) = self.covariance.as_mut_slice().split_at_mut(rates * states);
         let (of_values, alone) = of_values.split_at_mut(rates * states);
         let pairs = of_rates.chunks_mut(block).zip(of_values.chunks_mut(block)).enumerate();

@@ -288,6 +288,11 @@ impl Detection {
             offset,
             co_rotation_penalty: None,
         };
+        // K of the known planets beside another that was found
+        if !found.known.planets.is_empty() && found.is_candidate() && found.known.companion.is_none() {
+            let frequency = 1.0 / found.blind.best().porb_over_prot;
+            found.known = found.known.with_companion(frequency, &found.planet_free.quadratic);
+        }
         match found.known.first().map(KnownPlanet::peak) {
             // the star without another planet is imaged with its orbit
             Some(peak) => (found.best, found.closed) = (peak, true),
@@ -405,16 +410,17 @@ impl Detection {
         all.map(|(there, peak)| keplerian(&self.known.beside(&there.quadratic), &self.frequencies, peak)).collect()
     }
 
-    /// A search with the best orbit taken out; `None` where that leaves nothing.
+    /// A search with the highest peak taken out; `None` where that leaves nothing.
     fn second_planet(
         &self,
         surface: &dyn SurfaceModel,
         settings: SearchSettings,
     ) -> Result<Option<SecondPlanet>, Unbounded> {
         let quadratic = &*self.known.beside(&self.last().quadratic);
-        let Some(rest) = without(quadratic, 1.0 / self.best.porb_over_prot) else { return Ok(None) };
+        let first = self.highest();
+        let Some(rest) = without(quadratic, 1.0 / first.porb_over_prot) else { return Ok(None) };
         let search = imitated(surface, Search::new(&rest, &self.frequencies, settings)?);
-        let both = both(quadratic, &self.frequencies, &self.best, search.best());
+        let both = both(quadratic, &self.frequencies, first, search.best());
         Ok(Some(SecondPlanet { search, both }))
     }
 }

@@ -79,4 +79,8 @@ fn two_known_planets_are_judged_together_and_a_third_is_found_beside_them() {
     says(&said, &["Known planet: detected", "Blind search: ", "blind search beside the known planet:"]);
     let found = number(&one.json("search/periodogram.json")["peaks"][0]["period_d"]);
     assert!((1.0 / found - 1.0 / PERIODS_D[1]).abs() < 0.5 / 13.0, "the second planet: {found}");
+    // a second one beside that is a third of the star
+    one.succeed(&["periodogram", "config.json", "--planets", "2", "--draws", "1000", "--out", "third"]);
+    let first = &one.json("third/periodogram.json")["second"]["orbits"][0];
+    assert!((number(&first["k_kms"]) - K_KMS[1]).abs() < 4.0 * number(&first["sigma_k_kms"]), "{first}");
 }

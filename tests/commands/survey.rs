@@ -244,6 +244,6 @@ fn stars_without_a_blind_verdict_do_not_count() {
         file.replace("\"against\"", "\"known\":{\"significance\":1.0,\"k_upper95_kms\":0.1},\"against\"")
     });
     let printed = desk.succeed(&["survey", "stars", "--out", "survey"]);
-    says(&printed, &["warning: Star 2: no verdict", "warning: Star 3: a known ephemeris"]);
+    says(&printed, &["warning: Star 2: no verdict", "warning: Star 3: a planet of known ephemeris"]);
     assert_eq!(desk.json("survey/survey.json")["rates"][0]["stars"], 1);
 }

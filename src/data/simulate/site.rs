@@ -66,10 +66,7 @@ impl Site {
     /// The longest time (d) without a break in which the star is observable in the night of `time_d`, from local noon to
     /// noon: first and last moment. `None` where it is not.
     pub fn window_d(&self, time_d: f64) -> Option<[f64; 2]> {
-        let jd = self.time_zero_jd + time_d;
-        // local noon: Julian days begin at noon in Greenwich
-        let east = (self.longitude_deg + 180.0).rem_euclid(360.0) - 180.0;
-        let noon = (jd + east / 360.0).floor() - east / 360.0;
+        let noon = self.night(time_d) as f64 - self.east();
         let time = |k: usize| noon + k as f64 / STEPS as f64;
         let mut best: Option<[usize; 2]> = None;
         let mut from = None;
@@ -85,6 +82,17 @@ impl Site {
             }
         }
         best.map(|ends| ends.map(|k| time(k) - self.time_zero_jd))
+    }
+
+    /// Number of the night of `time_d`, from local noon to noon.
+    pub fn night(&self, time_d: f64) -> i64 {
+        // Julian days begin at noon in Greenwich
+        (self.time_zero_jd + time_d + self.east()).floor() as i64
+    }
+
+    /// How many days earlier than in Greenwich noon is.
+    fn east(&self) -> f64 {
+        ((self.longitude_deg + 180.0).rem_euclid(360.0) - 180.0) / 360.0
     }
 
     fn is_observable(&self, jd: f64) -> bool {

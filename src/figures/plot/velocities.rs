@@ -110,11 +110,9 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
 pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure, PlotError> {
     let OrbitRecord { k_kms, sigma_k_kms, porb_over_prot, sigma_porb_over_prot, phi, period_d, .. } = file.best;
     // planets of known ephemeris, or the best orbit
-    let mut known = file.known_planets.iter().filter(|_| file.blind.is_some()).map(KnownPlanetRecord::eccentric);
-    let motion = match known.next() {
-        Some(first) => Motion { first, second: known.next() },
-        None => Motion::from(Orbit { k_kms, porb_over_prot, phi }),
-    };
+    let best = Motion::from(Orbit { k_kms, porb_over_prot, phi });
+    let first = file.first_known().map_or(best.first, KnownPlanetRecord::eccentric);
+    let motion = Motion { first, second: file.other_known().first().map(KnownPlanetRecord::eccentric) };
     // velocities count from a systemic velocity that is found
     let offset_kms = match file.systemic_velocity {
         Some(_) => 0.0,
@@ -147,8 +145,9 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
         vsys_kms: offset_kms,
         rotation_period_d: period_d / porb_over_prot,
         sigma: [Some(sigma_k_kms), sigma_porb_over_prot],
-        orbit_is: match (&file.blind, motion.second) {
-            (None, _) => "best orbit",
+        orbit_is: match (file.first_known(), motion.second) {
+            (None, None) => "best orbit",
+            (None, Some(_)) => "best orbit and known planet",
             (Some(_), None) => "known planet",
             (Some(_), Some(_)) => "known planets",
         },
@@ -160,12 +159,13 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
         uncertainties are correlated, bars are the diagonal of the covariance (covariance.csv), without the \
         uncertainty of systemic velocity and RV offsets, which shifts all profiles of a data set alike. Bottom: \
         residuals. Right: the same folded with the orbital period{}; phase 0 is the largest velocity.{}",
-        match file.known_planets.len() {
-            _ if file.blind.is_none() => "best orbit",
-            1 => "orbit of the known planet",
-            _ => "orbits of the known planets",
+        match (file.first_known(), motion.second) {
+            (None, None) => "best orbit",
+            (None, Some(_)) => "best orbit and that of the known planet",
+            (Some(_), None) => "orbit of the known planet",
+            (Some(_), Some(_)) => "orbits of the known planets",
         },
-        if motion.second.is_some() { " of the first planet, the second taken out" } else { "" },
+        if motion.second.is_some() { " of the first orbit, the second taken out" } else { "" },
         curves.of_events(),
     );
     Ok(figure)

@@ -98,7 +98,7 @@ fn search(file: &PeriodogramFile) -> Chapter {
             peak.rotation.clone().unwrap_or_else(|| NOTHING.into()),
         ]
     };
-    let beside = file.known_planets.iter().skip(usize::from(file.blind.is_some())).map(|planet| &planet.verdict);
+    let beside = file.other_known().iter().map(|planet| &planet.verdict);
     let k = format!("*K* ({})", unit.name);
     let head = ["period (d)", &k, "*σ*_{K}", "Δ ln *L*", "FAP", "alias", "rotation"];
     Chapter {
@@ -108,7 +108,7 @@ fn search(file: &PeriodogramFile) -> Chapter {
         notes,
         tables: vec![
             (
-                if file.blind.is_some() { "The known planet." } else { "The best orbit." }.into(),
+                if file.first_known().is_some() { "The known planet." } else { "The best orbit." }.into(),
                 table(&["parameter", "best", "uncertainty", "injected"], orbit),
             ),
             ("Peaks of the periodogram.".into(), table(&head, file.peaks.iter().map(peak).collect())),

@@ -11,10 +11,11 @@
 use crate::model::{Ephemeris, ParameterValues};
 use crate::planets::mixture::{Mixture, Part};
 use crate::planets::periodogram::orbits::SIGMA_OF_UNKNOWN_PHASE;
+use crate::planets::periodogram::two_planets::without;
 use crate::planets::periodogram::{CircularOrbit, Jitters, Peak};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::surface::{Linearised, WithoutJitter};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3};
 use std::borrow::Cow;
 
 /// Ephemerides are tried within so many standard errors.
@@ -51,10 +52,16 @@ pub struct KnownAmplitude {
 pub struct Known {
     /// The planets.
     pub planets: Vec<KnownPlanet>,
+    /// Frequency (orbits a rotation cycle) of another planet that was found beside them, whose orbit is left free where K
+    /// is measured.
+    pub companion: Option<f64>,
+    /// Velocities of the star without each of the planets.
+    absent: Vec<VelocityQuadratic>,
 }
 
 impl Known {
-    /// The star `here` without them: K of each with the others' free, beside the jitter of a star that has the others.
+    /// The star `here` without them: K of each with the others' free; where a jitter is fitted, beside that of a star
+    /// that has the others.
     pub fn absent(ephemerides: &[Ephemeris], here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Self {
         Known::of(ephemerides, |ephemeris| match (ephemerides, without_jitter) {
             // of a single one as the star is
@@ -68,11 +75,25 @@ impl Known {
 
     /// K of each by velocities of a star without it.
     fn of(ephemerides: &[Ephemeris], rest: impl Fn(&Ephemeris) -> VelocityQuadratic) -> Self {
-        let planet = |ephemeris: &Ephemeris| {
-            let rest = rest(ephemeris);
-            KnownPlanet { ephemeris: *ephemeris, alone: rest.amplitude(&unit(ephemeris, &rest)), k: None }
+        let absent: Vec<VelocityQuadratic> = ephemerides.iter().map(rest).collect();
+        let planet = |(ephemeris, rest): (&Ephemeris, &VelocityQuadratic)| KnownPlanet {
+            ephemeris: *ephemeris,
+            alone: rest.amplitude(&unit(ephemeris, rest)),
+            k: None,
         };
-        Known { planets: ephemerides.iter().map(planet).collect() }
+        Known { planets: ephemerides.iter().zip(&absent).map(planet).collect(), companion: None, absent }
+    }
+
+    /// The same where another planet was found at that frequency (orbits a rotation cycle): K of each, alone and by the
+    /// velocities of the star with them, with its orbit free.
+    #[must_use]
+    pub fn with_companion(mut self, frequency: f64, quadratic: &VelocityQuadratic) -> Self {
+        self.companion = Some(frequency);
+        for (planet, rest) in self.planets.iter_mut().zip(&self.absent) {
+            let rest = without(rest, frequency).unwrap_or_else(|| rest.clone());
+            planet.alone = rest.amplitude(&unit(&planet.ephemeris, &rest));
+        }
+        self.present(quadratic)
     }
 
     /// Writes their orbits into `values`, of the K that a star without them shows.
@@ -99,6 +120,7 @@ impl Known {
         let ephemerides: Vec<Ephemeris> = self.ephemerides().collect();
         for planet in &mut self.planets {
             let rest = beside(others(&ephemerides, &planet.ephemeris), quadratic);
+            let rest = self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned);
             planet.k = over_errors(&rest, &planet.ephemeris)
                 .map(|k| KnownAmplitude { moments: k.moments(), upper95: k.upper95() });
         }
@@ -115,14 +137,15 @@ impl Known {
         beside(self.ephemerides(), quadratic)
     }
 
-    /// The same with the orbits of all but that planet left free.
+    /// The same with the orbits of all but that planet left free, that of another that was found as well.
     pub fn beside_others<'a>(
         &self,
         planet: &KnownPlanet,
         quadratic: &'a VelocityQuadratic,
     ) -> Cow<'a, VelocityQuadratic> {
         let others = self.ephemerides().filter(|of| of.planet != planet.ephemeris.planet);
-        beside(others, quadratic)
+        let rest = beside(others, quadratic);
+        self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned)
     }
 
     /// The columns that are left free, profiles x amplitudes; `None` where there is no such planet.
@@ -145,6 +168,7 @@ impl Known {
         let rest = self.beside_others(planet, quadratic);
         let [k_kms, sigma_k_kms, delta_ln_l] = jitters(&rest).amplitude(&unit(&planet.ephemeris, quadratic));
         let CircularOrbit { phi, sigma_phi, .. } = planet.orbit();
+        let delta_ln_l = if k_kms > 0.0 { delta_ln_l } else { delta_ln_l.min(0.0) };
         delta_ln_l.is_finite().then_some(CircularOrbit { k_kms, sigma_k_kms, phi, sigma_phi, delta_ln_l })
     }
 }
@@ -159,20 +183,26 @@ impl KnownPlanet {
             k_kms,
             sigma_k_kms,
             phi: values[self.ephemeris.of().phi],
-            sigma_phi: (self.ephemeris.conjunction_d[1] / self.ephemeris.period_d[0]).min(SIGMA_OF_UNKNOWN_PHASE),
-            delta_ln_l: 0.5 * (self.alone[0] / self.alone[1]).powi(2),
+            sigma_phi: self.ephemeris.phase_error(self.ephemeris.clock.epoch_d).min(SIGMA_OF_UNKNOWN_PHASE),
+            delta_ln_l: 0.5 * (self.alone[0] / self.alone[1]).max(0.0).powi(2),
         }
     }
 
     /// The same as a peak of a search would be.
     pub fn peak(&self) -> Peak {
         let [period_d, sigma_d] = self.ephemeris.period_d;
-        let prot = self.ephemeris.clock.rotation_period_d;
+        let (prot, orbit) = (self.ephemeris.clock.rotation_period_d, self.orbit());
+        // phi is counted from the epoch, over as many orbits as the conjunction is away
+        let orbits = (self.ephemeris.conjunction_d[0] - self.ephemeris.clock.epoch_d) / period_d;
+        let [of_period, of_phi] =
+            [(sigma_d / prot).powi(2), self.ephemeris.phase_error(self.ephemeris.clock.epoch_d).powi(2)];
+        let across = -orbits * prot / period_d * of_period;
+        let covariance = Matrix3::new(orbit.sigma_k_kms.powi(2), 0.0, 0.0, 0.0, of_period, across, 0.0, across, of_phi);
         Peak {
             porb_over_prot: period_d / prot,
             sigma_porb_over_prot: (sigma_d > 0.0).then_some(sigma_d / prot),
-            orbit: self.orbit(),
-            covariance: None,
+            orbit,
+            covariance: Some(covariance),
             on_edge: false,
             alias: None,
             imitation: None,
@@ -290,6 +320,44 @@ mod tests {
         let rest = known.beside(&quadratic);
         let left = rest.gradient.norm() / quadratic.gradient.norm();
         assert!(left < 0.15, "{left}");
+    }
+
+    /// Errors of the phase at any time are those of the ephemeris, however far away its conjunction is.
+    #[test]
+    fn a_distant_conjunction_leaves_phases_uncertain() {
+        let given = Ephemeris { period_d: [5.0, 0.008], ..ephemeris(0, 5.0, [-190.0, 0.01]) };
+        let planet = KnownPlanet { ephemeris: given, alone: [0.1, 0.01], k: None };
+        let covariance = planet.peak().covariance.unwrap();
+        assert!((planet.orbit().sigma_phi - 0.0608).abs() < 1e-3, "{}", planet.orbit().sigma_phi);
+        for time_d in [-190.0, 0.0, 12.0] {
+            // phase = t / P - phi, P in rotations of 2 d
+            let slope = -time_d * CLOCK.rotation_period_d / 25.0;
+            let variance = slope.powi(2) * covariance[(1, 1)] + covariance[(2, 2)] - 2.0 * slope * covariance[(1, 2)];
+            assert!((variance.sqrt() - given.phase_error(time_d)).abs() < 1e-12, "{time_d}");
+        }
+    }
+
+    /// A planet that moves the star the other way has no height.
+    #[test]
+    fn a_negative_k_is_no_planet() {
+        let planet = ephemeris(0, 5.0, [7.0, 0.0]);
+        let quadratic = quadratic(&[(planet, -0.1)]);
+        let known = Known::of(&[planet], |_| quadratic.clone()).present(&quadratic);
+        let orbit = known.orbit_of(&known.planets[0], &quadratic, &Jitters::none).unwrap();
+        assert!((orbit.k_kms + 0.1).abs() < 1e-12 && orbit.delta_ln_l == 0.0);
+        assert_eq!(known.planets[0].orbit().delta_ln_l, 0.0);
+    }
+
+    /// Beside another planet, of which nothing was known, K is as it is.
+    #[test]
+    fn k_is_measured_beside_a_companion() {
+        let (b, c) = (ephemeris(0, 5.0, [7.0, 0.0]), ephemeris(1, 9.1, [3.0, 0.0]));
+        let quadratic = quadratic(&[(b, 0.06), (c, 0.3)]);
+        let known = Known::of(&[b], |_| quadratic.clone()).present(&quadratic);
+        let off = |known: &Known| (known.planets[0].k.unwrap().moments[0] - 0.06).abs();
+        let beside = known.clone().with_companion(2.0 / 9.1, &quadratic);
+        assert!(off(&known) > 1e-3 && off(&beside) < 1e-9, "{} {}", off(&known), off(&beside));
+        assert!((beside.planets[0].alone[0] - 0.06).abs() < 1e-9);
     }
 
     /// Two planets at once: K of each as it is, and nothing is left beside them; alone, each takes a part of the other.

@@ -1,7 +1,7 @@
 //! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the
 //! verdict.
 
-use super::{Detection, DetectionSettings, Robustness};
+use super::{Detection, DetectionSettings, KnownPlanet, Robustness};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
@@ -17,6 +17,9 @@ const OFFSET_GAIN: f64 = 12.5;
 
 /// Delta ln L of a known planet whose false-alarm probability is 1 %: 2.33 standard errors, one-sided.
 const KNOWN_LEVEL: f64 = 2.706;
+
+/// A K of a known planet that is below zero by so many standard errors is worth a word.
+const NEGATIVE: f64 = 2.0;
 
 /// Other peaks that may be the true one, as many as are named.
 const RIVALS_NAMED: usize = 3;
@@ -79,21 +82,24 @@ impl Detection {
         let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         remarks.extend(self.of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
+        if self.highest().on_edge {
+            remarks.push(Remark::against(
+                "P at the edge of the search",
+                "The best period lies at the edge of the search: extend it (--min-period-d, --max-period-d).",
+            ));
+        }
         remarks
     }
 
     /// What is to be said of the best orbit.
     fn of_the_best_orbit(&self, evidence: &Evidence) -> Vec<Remark> {
         if let Some(planet) = self.known.first() {
-            return self.of_choices(evidence.robustness, planet.orbit().delta_ln_l, KNOWN_LEVEL);
+            let mut remarks = self.of_choices(evidence.robustness, planet.orbit().delta_ln_l, KNOWN_LEVEL);
+            remarks.extend(self.of_negative(planet));
+            return remarks;
         }
         let mut remarks = self.of_the_peak(evidence.robustness);
-        if self.best.on_edge {
-            remarks.push(Remark::against(
-                "P at the edge of the search",
-                "The best period lies at the edge of the search: extend it (--min-period-d, --max-period-d).",
-            ));
-        } else if !self.closed {
+        if !self.best.on_edge && !self.closed {
             let rounds = self.rounds;
             remarks.push(Remark::against(
                 "K not converged",
@@ -101,6 +107,18 @@ impl Detection {
             ));
         }
         remarks
+    }
+
+    /// That the star moves as if the planet were on the other side.
+    fn of_negative(&self, planet: &KnownPlanet) -> Option<Remark> {
+        let [k_kms, sigma_k_kms] = planet.alone;
+        let sigmas = -k_kms / sigma_k_kms;
+        (sigmas > NEGATIVE).then(|| {
+            Remark::note(format!(
+                "K of the known planet is negative at {sigmas:.1}σ: is its time that of the conjunction with the planet in \
+                front?"
+            ))
+        })
     }
 
     /// What else has to be known of the search.

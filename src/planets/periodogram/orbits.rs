@@ -100,13 +100,16 @@ pub fn at(quadratic: &VelocityQuadratic, frequency: f64) -> Trial {
     scan(quadratic, &[frequency])[0]
 }
 
-/// Information on (a, b) of an orbit at one frequency with the amplitudes of one at another left free; `None` where
-/// those are not bounded.
-pub fn between(quadratic: &VelocityQuadratic, frequency: f64, other: f64) -> Option<Matrix2<f64>> {
+/// Information on (a, b) of an orbit at one frequency with the amplitudes of one at another left free, of which the
+/// prior has the information `prior` (s^2/km^2). `None` where either is not bounded.
+pub fn between(quadratic: &VelocityQuadratic, frequency: f64, other: f64, prior: f64) -> Option<Matrix2<f64>> {
     let x = design(&quadratic.cycles, &[frequency, other]);
     let a = x.tr_mul(&(&quadratic.information * &x));
     let [own, across, others] = [(0, 0), (0, 2), (2, 2)].map(|at| a.fixed_view::<2, 2>(at.0, at.1).into_owned());
-    Some(own - across * others.try_inverse()? * across.transpose())
+    let least = SINGULAR * quadratic.information.trace();
+    let others = others + Matrix2::identity() * prior;
+    let rest = own - across * others.try_inverse().filter(|_| eigenvalues(&others).0 > least)? * across.transpose();
+    (prior > 0.0 || eigenvalues(&rest).0 > least).then_some(rest)
 }
 
 /// Smallest and largest eigenvalue of a symmetric matrix; NaN if it holds one.

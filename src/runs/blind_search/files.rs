@@ -92,7 +92,8 @@ impl BlindSearch<'_> {
     /// That of the first search, with Delta ln L of the regularised likelihood beside it.
     fn first_periodogram(&self) -> Table {
         let found = &self.detection;
-        let regularised = scan(&found.planet_free.regularised, &found.frequencies.per_cycle);
+        let regularised = found.known.beside(&found.planet_free.regularised);
+        let regularised = scan(&regularised, &found.frequencies.per_cycle);
         let mut table = Table::new(&[&COLUMNS[..], &["regularised_delta_ln_l"]].concat());
         for (mut numbers, trial) in self.rows(&found.blind).zip(regularised) {
             numbers.push(trial.orbit.map_or(f64::NAN, |orbit| orbit.delta_ln_l));

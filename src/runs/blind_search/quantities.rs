@@ -52,7 +52,9 @@ impl QuantitiesRecord {
         let at_period = [[found.sigma_k_kms.powi(2), 0.0, 0.0], [0.0; 3], [0.0, 0.0, found.sigma_phi.powi(2)]];
         let covariance = peak.covariance.map_or(at_period, |c| [0, 1, 2].map(|i| [0, 1, 2].map(|j| c[(i, j)])));
         let all = [OrbitQuantity::Maximum, OrbitQuantity::Conjunction, OrbitQuantity::MinimumMass];
-        QuantitiesRecord::new(all.map(|quantity| quantities.estimate(quantity, &orbit, &covariance)))
+        let [maximum, conjunction, mass] = all.map(|quantity| quantities.estimate(quantity, &orbit, &covariance));
+        // K of a known planet may be below zero
+        QuantitiesRecord::new([maximum, conjunction, mass.filter(|_| found.k_kms > 0.0)])
     }
 
     /// Of an eccentric orbit; the error of the mass is that of `K sqrt(1 - e^2)`.

@@ -86,6 +86,18 @@ pub struct PeriodogramFile {
     pub provenance: Provenance,
 }
 
+impl PeriodogramFile {
+    /// The first planet of the config, where its ephemeris is known: what the verdict is on.
+    pub fn first_known(&self) -> Option<&KnownPlanetRecord> {
+        self.known_planets.first().filter(|planet| planet.planet == 1)
+    }
+
+    /// The planets of known ephemeris that the verdict is not on.
+    pub fn other_known(&self) -> &[KnownPlanetRecord] {
+        &self.known_planets[usize::from(self.first_known().is_some())..]
+    }
+}
+
 impl Saved for PeriodogramFile {
     fn check(&self) -> Result<(), String> {
         let SearchRecord { min_period_d, max_period_d, .. } = self.search;

@@ -10,7 +10,7 @@ use crate::inference::detection::{
 };
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Parameter, for_blind_search};
-use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
+use crate::planets::verdict::{CANDIDATE_FAP, Remark, Signal, UNBOUNDED, Verdict, one_sided};
 use crate::surface::{Constants, Explained, Linearised};
 use std::borrow::Cow;
 
@@ -75,7 +75,10 @@ impl<'a> BlindSearch<'a> {
         let (imager, settings) = (&scene.imager, options.detection(scene));
         let is_tried = match options.robustness {
             RobustnessOf::Any => true,
-            RobustnessOf::Candidates => detection.is_candidate(),
+            RobustnessOf::Candidates => match detection.known.first() {
+                Some(KnownPlanet { alone: [k_kms, sigma_kms], .. }) => one_sided(k_kms / sigma_kms) < CANDIDATE_FAP,
+                None => detection.is_candidate(),
+            },
             RobustnessOf::None => false,
         };
         let try_out = |tried| {
@@ -91,27 +94,28 @@ impl<'a> BlindSearch<'a> {
         let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
         let evidence = Evidence { imager, settings: &settings, robustness: robustness.as_ref(), misfit: &misfit };
         let mut remarks = detection.remarks(&evidence);
-        let mut verdict = detection.verdict(&remarks);
         let of_the_star = detection.of_the_star(&evidence);
-        let verdict_on = |planet: &KnownPlanet| known(planet, detection.known.planets.len(), &of_the_star);
+        let why_not = scene.measured.problem().or_else(|| detection.not_judged());
+        let judged = |verdict: Verdict| why_not.as_ref().map_or(verdict, Verdict::not_judged);
+        let verdict_on = |planet: &KnownPlanet| judged(known(planet, detection.known.planets.len(), &of_the_star));
         let known: Vec<Verdict> = detection.known.planets.iter().map(verdict_on).collect();
+        let mut verdict = detection.verdict(&remarks);
         let mut blind = None;
         if first.is_some() {
             // what is said of the highest peak beside it
-            let mut of_the_peak = of_the_star.clone();
             let is_tried = detection.is_candidate() && options.robustness != RobustnessOf::None;
             let tried = is_tried.then(|| try_out(Tried::Peak(detection.highest())));
-            of_the_peak.extend(detection.of_the_peak(tried.as_ref()));
-            blind = Some(detection.verdict(&of_the_peak));
+            let of_the_peak = detection.of_the_peak(tried.as_ref());
+            blind = Some(detection.verdict(&[of_the_star, of_the_peak.clone()].concat()));
             verdict = known[0].clone().with(&remarks);
+            let said = |remark: Remark| Remark::note(format!("Blind search: {}", remark.text));
+            remarks.extend(of_the_peak.into_iter().map(said));
+            remarks.extend(of_a_companion(&detection));
         } else if scene.settings.free.iter().any(|f| f.parameter == Parameter::K) {
             // where an orbit is asked for, of those that are allowed
             verdict = within_priors(scene, &detection, verdict, &mut remarks);
         }
-        if let Some(text) = scene.measured.problem() {
-            verdict = Verdict::not_judged(text);
-            blind = None;
-        }
+        let (verdict, blind) = (judged(verdict), blind.map(judged));
         let evidence = scene.evidence(&detection.jitters());
         let constants = detection.constants(imager, &settings.nuisances);
         BlindSearch {
@@ -146,6 +150,16 @@ impl<'a> BlindSearch<'a> {
         remarks.extend(evidence.iter().map(|evidence| Remark::note(evidence.sentence.clone())));
         SearchSummary { verdict, remarks, rotation: Some(detection.blind.rotation.clone()), evidence }
     }
+}
+
+/// That another planet was found beside those that are known.
+fn of_a_companion(detection: &Detection) -> Option<Remark> {
+    let frequency = detection.known.companion?;
+    let period_d = detection.frequencies.rotation_period_d / frequency;
+    Some(Remark::note(format!(
+        "K of the known planets is measured beside the candidate at P = {period_d:.2} d; K of the candidate is of the \
+        first linearisation."
+    )))
 }
 
 /// What is said of a planet of known ephemeris, one of so many, beside the remarks on its star.

@@ -27,10 +27,17 @@ impl PeriodogramFile {
     /// The text, a line or a table after the other.
     fn table(&self, rotation_period_d: f64) -> String {
         let mut text = self.verdicts() + "\n";
-        text += &match &self.blind {
-            Some(_) => self.orbits(&self.known_orbits(), rotation_period_d),
-            None => self.orbits(std::slice::from_ref(&self.best), rotation_period_d),
-        };
+        // the best orbit, or the first known planet, with the other known ones
+        let known = self.other_known();
+        let orbits: Vec<OrbitRecord> =
+            std::iter::once(&self.best).chain(known.iter().map(|planet| &planet.orbit)).cloned().collect();
+        let names: Vec<String> = std::iter::once(match self.first_known() {
+            Some(first) if !known.is_empty() => format!("planet {}", first.planet),
+            _ => "best".to_owned(),
+        })
+        .chain(known.iter().map(|planet| format!("planet {}", planet.planet)))
+        .collect();
+        text += &self.orbits(&orbits, &names, rotation_period_d);
         text += &meanings(&self.best.quantities);
         if let Some(field) = &self.field {
             text += &field.line();
@@ -45,7 +52,7 @@ impl PeriodogramFile {
         if let Some(drift) = &self.drift {
             text += &format!("{}\n", drift.line());
         }
-        if self.blind.is_some() {
+        if !self.known_planets.is_empty() {
             text += &format!("blind search beside the known planet{}:\n", plural(self.known_planets.len()));
         }
         text += &format!("{}\n", chance(&self.false_alarm));
@@ -59,7 +66,7 @@ impl PeriodogramFile {
         if let Some(second) = &self.second {
             text += &format!("second planet: {}\n", chance(&second.false_alarm));
             match &second.orbits {
-                Some(both) => text += &self.orbits(both, rotation_period_d),
+                Some(both) => text += &self.orbits(both, &["first", "second"].map(str::to_owned), rotation_period_d),
                 None => text += &peaks(&second.peaks),
             }
         }
@@ -74,23 +81,17 @@ impl PeriodogramFile {
     /// What is said of the planets, a line each.
     fn verdicts(&self) -> String {
         let mut lines = vec![self.verdict.sentence.clone()];
-        let beside = self.known_planets.iter().skip(usize::from(self.blind.is_some()));
-        lines.extend(beside.map(|planet| planet.verdict.sentence.clone()));
+        lines.extend(self.other_known().iter().map(|planet| planet.verdict.sentence.clone()));
         lines.extend(self.blind.iter().map(|blind| format!("Blind search: {}", blind.sentence)));
         lines.iter().map(|line| format!("{line}\n")).collect()
     }
 
-    fn known_orbits(&self) -> Vec<OrbitRecord> {
-        self.known_planets.iter().map(|planet| planet.orbit.clone()).collect()
-    }
-
-    /// Parameters of one orbit or several, a line each, beside the true ones of the first.
-    fn orbits(&self, orbits: &[OrbitRecord], prot: f64) -> String {
+    /// Parameters of one orbit or several of these names, a line each, beside the true ones of a single one.
+    fn orbits(&self, orbits: &[OrbitRecord], names: &[String], prot: f64) -> String {
         let truth = self.truth.filter(|_| orbits.len() == 1);
         let head = if truth.is_some() { &["parameter", "truth"][..] } else { &["parameter"] };
         let mut head: Vec<String> = head.iter().map(|s| (*s).to_owned()).collect();
-        let number = |k: usize| if orbits.len() > 1 { format!("planet {}", k + 1) } else { "best".to_owned() };
-        head.extend((0..orbits.len()).flat_map(|k| [number(k), "sigma".to_owned()]));
+        head.extend(names.iter().flat_map(|name| [name.clone(), "sigma".to_owned()]));
         let mut rows = vec![head];
         for name in ["k_kms", "period_d", "porb_over_prot", "phi"] {
             let value = |o: &OrbitRecord| match name {

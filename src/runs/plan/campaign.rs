@@ -4,6 +4,7 @@ use crate::data::calibrated::{fingerprint, imager};
 use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, Settings};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::{Scene, SceneError};
+use crate::data::simulate::Site;
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
@@ -162,7 +163,8 @@ impl Campaign {
             }
             _ => unreachable!("observed profiles have a plan"),
         };
-        let mut nights = nights(&planned.times_d(), NIGHT_GAP_D);
+        let site = settings.plan.as_ref().and_then(|plan| plan.site.filter(|_| plan.times_d.is_none()));
+        let mut nights = nights_of(&planned.times_d(), site.as_ref());
         if let Some(wanted) = wanted.filter(|_| schedule_of(config).is_none()) {
             if wanted > nights.len() {
                 return Err(CampaignError::Nights { path: own.path.clone(), wanted, listed: nights.len() });
@@ -170,7 +172,7 @@ impl Campaign {
             nights.truncate(wanted);
             let kept: Vec<usize> = nights.iter().flatten().copied().collect();
             planned.profiles = kept.iter().map(|k| planned.profiles[*k].clone()).collect();
-            nights = self::nights(&planned.times_d(), NIGHT_GAP_D);
+            nights = nights_of(&planned.times_d(), site.as_ref());
         }
         let before = taken.map_or(0, |taken| taken.observations.profiles.len());
         nights.iter_mut().flatten().for_each(|k| *k += before);
@@ -297,6 +299,14 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
     }
 }
 
+/// Numbers of the profiles of each night: from local noon to noon at a place, or else as gaps tell.
+fn nights_of(times_d: &[f64], site: Option<&Site>) -> Vec<Vec<usize>> {
+    let Some(site) = site else { return nights(times_d, NIGHT_GAP_D) };
+    let mut order: Vec<usize> = (0..times_d.len()).collect();
+    order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
+    order.chunk_by(|a, b| site.night(times_d[*a]) == site.night(times_d[*b])).map(<[usize]>::to_vec).collect()
+}
+
 /// Planned profiles like those that have been taken: bins of the last of them, and a median error where no
 /// signal-to-noise ratio is planned.
 fn next(plan: &PlanSection, taken: &Observations, settings: &Settings) -> Result<Observations, ConfigError> {
@@ -323,6 +333,11 @@ fn next(plan: &PlanSection, taken: &Observations, settings: &Settings) -> Result
             Some((from, to - from))
         }),
     };
+    let before = times_d.iter().copied().find(|time_d| *time_d <= last_d);
+    if let Some(time_d) = before.filter(|_| plan.times_d.is_some()) {
+        let problem = format!("{time_d} is not after the last profile ({last_d}): give coming nights");
+        return Err(settings.fault("plan.times_d", &problem));
+    }
     if times_d.is_empty() {
         let problem = "in none of the nights is the star high enough while it is dark: another first_d, or a lower \
             min_altitude_deg";

@@ -5,13 +5,14 @@
 //! (`surface::planned`). Means over maps, where it depends on them.
 
 use super::{Campaign, PlanError, PlanSettings};
+use crate::data::ephemeris::ephemerides;
 use crate::field::FieldError;
 use crate::model::Ephemeris;
 use crate::planets::periodogram::orbits::{at, between};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::surface::expansion::nuisances;
 use crate::surface::planned::Planned;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -36,7 +37,7 @@ pub enum Aim {
         /// Its period (d).
         period_d: f64,
         /// Its ephemeris, where it is known; any phase otherwise.
-        #[serde(skip)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         ephemeris: Option<Ephemeris>,
     },
     /// Telling a planet of this period from one of another, any phases.
@@ -93,46 +94,83 @@ struct Weighed<'a> {
     maps: Vec<DMatrix<f64>>,
     campaign: &'a Campaign,
     aim: &'a Aim,
+    /// Other planets, whose K is left free.
+    others: Vec<Ephemeris>,
 }
 
+/// Standard errors of K (km/s) of some nights: with a wide prior, by which nights are compared where too few are taken
+/// to bound an orbit, and as they are, infinite where it is not bounded.
+#[derive(Clone, Copy, Debug)]
+struct Sigma {
+    beside_prior: f64,
+    alone: f64,
+}
+
+/// Information of that prior (s^2/km^2): of 1 km/s.
+const PRIOR: f64 = 1.0;
+
 impl Weighed<'_> {
-    /// Standard error of K with these coming nights; infinite where it is not bounded.
-    fn sigma(&self, nights: &[usize]) -> Result<f64, FieldError> {
+    /// Standard errors of K with these coming nights.
+    fn sigma(&self, nights: &[usize]) -> Result<Sigma, FieldError> {
         let mut part: Vec<usize> = (0..self.campaign.before()).collect();
         part.extend(nights.iter().flat_map(|night| self.campaign.nights[*night].iter().copied()));
         part.sort_unstable();
         if part.is_empty() {
-            return Ok(f64::INFINITY);
+            return Ok(Sigma { beside_prior: PRIOR.sqrt().recip(), alone: f64::INFINITY });
         }
-        let mut variances = Vec::new();
+        let mut sums = [0.0; 2];
         for maps in &self.maps {
             let quadratic = &self.planned.velocities(maps, std::slice::from_ref(&part))?[0];
-            variances.push(self.aim.variance(quadratic, self.campaign.imager.star.rotation_period_d));
+            let unit = |of: &Ephemeris| {
+                let unit = of.unit_velocities(of.period_d[0], of.conjunction_d[0], &quadratic.cycles);
+                DVector::from_vec(unit)
+            };
+            let columns: Vec<DVector<f64>> = self.others.iter().map(unit).collect();
+            let rest = if columns.is_empty() { None } else { quadratic.beside(&DMatrix::from_columns(&columns)) };
+            let quadratic = rest.as_ref().unwrap_or(quadratic);
+            for (sum, prior) in sums.iter_mut().zip([PRIOR, 0.0]) {
+                *sum += self.aim.variance(quadratic, self.campaign.imager.star.rotation_period_d, prior);
+            }
         }
-        Ok((variances.iter().sum::<f64>() / variances.len() as f64).sqrt())
+        let [beside_prior, alone] = sums.map(|sum| (sum / self.maps.len() as f64).sqrt());
+        Ok(Sigma { beside_prior, alone })
     }
 
-    fn sigmas(&self, all: &[Vec<usize>]) -> Result<Vec<f64>, FieldError> {
+    fn sigmas(&self, all: &[Vec<usize>]) -> Result<Vec<Sigma>, FieldError> {
         all.par_iter().map(|nights| self.sigma(nights)).collect()
     }
 }
 
+/// Whether two periods (d) are one.
+pub fn is_same(a_d: f64, b_d: f64) -> bool {
+    (a_d / b_d - 1.0).abs() < 1e-3
+}
+
 impl Aim {
-    /// Variance of K (km^2/s^2), averaged over phases where these are not known; infinite where it is not bounded.
-    fn variance(&self, quadratic: &VelocityQuadratic, rotation_period_d: f64) -> f64 {
+    /// Period of the planet (d).
+    fn period_d(&self) -> f64 {
+        let (Aim::Amplitude { period_d, .. } | Aim::Alias { period_d, .. }) = self;
+        *period_d
+    }
+
+    /// Variance of K (km^2/s^2), averaged over phases where these are not known, beside a prior of that information
+    /// (s^2/km^2); infinite where it is not bounded.
+    fn variance(&self, quadratic: &VelocityQuadratic, rotation_period_d: f64, prior: f64) -> f64 {
         let found = match self {
             Aim::Amplitude { period_d, ephemeris: Some(known) } => {
                 let unit = known.unit_velocities(*period_d, known.conjunction_d[0], &quadratic.cycles);
-                Some(quadratic.amplitude(&DVector::from_vec(unit))[1].powi(2))
+                let alone = quadratic.amplitude(&DVector::from_vec(unit))[1].powi(-2);
+                Some((alone + prior).recip())
             }
             Aim::Amplitude { period_d, ephemeris: None } => {
                 let trial = at(quadratic, rotation_period_d / period_d);
-                let covariance = trial.orbit.and_then(|_| trial.information.try_inverse());
+                let information = trial.information + Matrix2::identity() * prior;
+                let covariance = information.try_inverse().filter(|_| prior > 0.0 || trial.orbit.is_some());
                 covariance.map(|covariance| 0.5 * covariance.trace())
             }
             Aim::Alias { period_d, other_d } => {
-                let rest = between(quadratic, rotation_period_d / period_d, rotation_period_d / other_d);
-                rest.map(|information| 2.0 / information.trace())
+                let rest = between(quadratic, rotation_period_d / period_d, rotation_period_d / other_d, prior);
+                rest.map(|information| 2.0 / (information.trace() + 2.0 * prior))
             }
         };
         found.filter(|variance| *variance > 0.0).unwrap_or(f64::INFINITY)
@@ -166,7 +204,9 @@ pub fn choose(
             .collect::<Result<_, _>>()
             .map_err(field)?,
     };
-    let weighed = Weighed { planned, maps, campaign, aim };
+    let is_other = |known: &Ephemeris| !is_same(known.period_d[0], aim.period_d());
+    let others = ephemerides(&campaign.settings).into_iter().filter(is_other).collect();
+    let weighed = Weighed { planned, maps, campaign, aim, others };
     let candidates = campaign.nights.len();
     let count = count.min(candidates);
     let mut chosen: Vec<usize> = Vec::new();
@@ -176,9 +216,10 @@ pub fn choose(
         let left: Vec<usize> = (0..candidates).filter(|night| !chosen.contains(night)).collect();
         let with = |night: &usize| chosen.iter().copied().chain([*night]).collect::<Vec<_>>();
         let sigmas = weighed.sigmas(&left.iter().map(with).collect::<Vec<_>>()).map_err(field)?;
-        let best = (0..left.len()).min_by(|a, b| sigmas[*a].total_cmp(&sigmas[*b])).unwrap_or(0);
+        let best =
+            (0..left.len()).min_by(|a, b| sigmas[*a].beside_prior.total_cmp(&sigmas[*b].beside_prior)).unwrap_or(0);
         chosen.push(left[best]);
-        nights.push(campaign.chosen(left[best], bounded(sigmas[best])));
+        nights.push(campaign.chosen(left[best], bounded(sigmas[best].alone)));
     }
     report(&format!("{}: even and random nights", campaign.name));
     let evenly = |n: usize| (0..n).map(|k| (2 * k + 1) * candidates / (2 * n)).collect::<Vec<_>>();
@@ -193,22 +234,22 @@ pub fn choose(
     }
     let at_random = weighed.sigmas(&draws).map_err(field)?;
     let median = |n: usize| {
-        let mut all: Vec<f64> = at_random.iter().skip(n).step_by(count).copied().collect();
+        let mut all: Vec<f64> = at_random.iter().skip(n).step_by(count).map(|sigma| sigma.alone).collect();
         all.sort_by(f64::total_cmp);
         all[all.len() / 2]
     };
-    let merits = |sigmas: Vec<f64>| {
-        let merit = |(k, sigma): (usize, f64)| Merit { nights: k + 1, sigma_k_kms: bounded(sigma) };
-        sigmas.into_iter().enumerate().map(merit).collect()
+    let merits = |sigmas: &[f64]| {
+        let merit = |(k, sigma): (usize, &f64)| Merit { nights: k + 1, sigma_k_kms: bounded(*sigma) };
+        sigmas.iter().enumerate().map(merit).collect()
     };
-    let now = Merit { nights: 0, sigma_k_kms: bounded(weighed.sigma(&[]).map_err(field)?) };
+    let now = Merit { nights: 0, sigma_k_kms: bounded(weighed.sigma(&[]).map_err(field)?.alone) };
     Ok(Choice {
         aim: aim.clone(),
         candidates,
         now,
         chosen: nights,
-        even: merits(even),
-        random: merits((0..count).map(median).collect()),
+        even: merits(&even.iter().map(|sigma| sigma.alone).collect::<Vec<_>>()),
+        random: merits(&(0..count).map(median).collect::<Vec<_>>()),
     })
 }
 

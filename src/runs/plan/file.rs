@@ -286,7 +286,7 @@ impl ScheduleRecord {
         let lives = spot_lifetime_d.map_or("static".into(), |d| format!("lifetime {d:.1} d"));
         let mut text = format!(
             "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); RV jitter \
-            {velocity_jitter_kms} km/s; S/N {:.0}\n\n",
+            {velocity_jitter_kms:.4} km/s; S/N {:.0}\n\n",
             source.words(),
             self.snr
         );
@@ -365,8 +365,9 @@ impl Choice {
         let last = |of: &[super::Merit]| sigma(of.last().and_then(|merit| merit.sigma_k_kms));
         let now = sigma(self.now.sigma_k_kms);
         let mut text = match &self.aim {
-            Aim::Amplitude { period_d, .. } => {
-                format!("next nights, for K of a planet of {period_d} d: sigma_K is {now} now\n")
+            Aim::Amplitude { period_d, ephemeris } => {
+                let at = if ephemeris.is_some() { "at its ephemeris" } else { "mean over phases" };
+                format!("next nights, for K of a planet of {period_d} d ({at}): sigma_K is {now} now\n")
             }
             Aim::Alias { period_d, other_d } => format!(
                 "next nights, to tell a planet of {period_d} d from one of {other_d} d: sigma_K of what the other \

@@ -1,13 +1,11 @@
 //! A whole plan: the schedules of several configs, compared.
 
-use super::choice::choose;
-use super::{
-    Aim, Campaign, CampaignError, Choice, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d,
-};
+use super::choice::{choose, is_same};
+use super::{Aim, Campaign, CampaignError, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d};
 use crate::data::config::{Config, ConfigError};
 use crate::data::ephemeris::ephemerides;
 use crate::data::io::atomic::WriteError;
-use crate::model::Parameter;
+use crate::model::{Ephemeris, Parameter};
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{FrequencyError, FrequencySettings};
 use std::path::Path;
@@ -33,7 +31,8 @@ impl Next {
     /// What the nights of a campaign are chosen for.
     fn aim(&self, campaign: &Campaign) -> Result<Aim, ConfigError> {
         let settings = &campaign.settings;
-        let known = ephemerides(settings).into_iter().find(|known| known.planet == 0);
+        let is_wanted = |known: &Ephemeris| self.period_d.is_none_or(|wanted_d| is_same(wanted_d, known.period_d[0]));
+        let known = ephemerides(settings).into_iter().find(is_wanted);
         let prot = settings.star.rotation_period_d;
         let of_config = || {
             let own = settings.values[Parameter::K] > 0.0;
@@ -43,10 +42,18 @@ impl Next {
             let problem = "no planet there, and --next chooses nights for one: give its period by --period-d";
             return Err(settings.fault("planet", problem));
         };
-        Ok(match self.other_d {
-            Some(other_d) => Aim::Alias { period_d, other_d },
-            None => Aim::Amplitude { period_d, ephemeris: known.filter(|_| self.period_d.is_none()) },
-        })
+        match self.other_d {
+            Some(other_d) if is_same(period_d, other_d) => {
+                let problem = format!("the planet has the period of --alias-d itself, {other_d} d: give another one");
+                Err(settings.fault("planet", &problem))
+            }
+            Some(other_d) => Ok(Aim::Alias { period_d, other_d }),
+            None => {
+                // at the ephemeris itself
+                let period_d = known.map_or(period_d, |known| known.period_d[0]);
+                Ok(Aim::Amplitude { period_d, ephemeris: known })
+            }
+        }
     }
 }
 
@@ -95,6 +102,8 @@ impl Forecast {
             report(&format!("reading {}", shown(config.path())));
             campaigns.extend(Campaign::of(config, nights)?);
         }
+        let aims = next.map(|next| campaigns.iter().map(|campaign| next.aim(campaign)).collect::<Result<Vec<_>, _>>());
+        let aims = aims.transpose().map_err(CampaignError::from)?;
         let range = range_d(&campaigns, periods).map_err(frequencies)?;
         let compared = compared_d(&campaigns, range);
         let one = |campaign: Campaign| {
@@ -107,11 +116,9 @@ impl Forecast {
         };
         let campaigns = campaigns.into_iter().map(one).collect::<Result<Vec<_>, _>>()?;
         let mut file = PlanFile::new(&looked(&campaigns), range, &compared, settings);
-        if let Some(next) = next {
-            for ((campaign, _), schedule) in campaigns.iter().zip(&mut file.schedules) {
-                let aim = next.aim(campaign).map_err(CampaignError::from)?;
-                let choice: Choice = choose(campaign, next.nights, &aim, settings, report)?;
-                schedule.next = Some(choice);
+        if let Some((next, aims)) = next.zip(aims) {
+            for (((campaign, _), aim), schedule) in campaigns.iter().zip(&aims).zip(&mut file.schedules) {
+                schedule.next = Some(choose(campaign, next.nights, aim, settings, report)?);
             }
         }
         Ok(Forecast { campaigns, file })

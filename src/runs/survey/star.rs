@@ -30,7 +30,7 @@ pub struct Star {
 
 /// Why a star does not count in rates.
 const NOT_JUDGED: &str = "no verdict, the star is not counted";
-const KNOWN: &str = "a known ephemeris, no blind search: the star is not counted";
+const KNOWN: &str = "a planet of known ephemeris: the star is not counted";
 
 impl Star {
     /// Why it says nothing of rates; `None` where it does.
