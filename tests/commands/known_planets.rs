@@ -25,7 +25,7 @@ fn config() -> Value {
             "schedule": { "nights": 14, "per_night": [2, 2], "night_hours": 7.0, "seed": 3 },
             "velocity_kms": { "min": -30, "max": 30, "step": 3.0 }, "snr": 800, "seed": 4, "pixels": 1000
         } },
-        "imaging": { "pixels": 300 },
+        "imaging": { "pixels": 300, "objective": "marginal-likelihood" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0, "max": 2 },
             "period_d": normal(PERIODS_D[0], 0.001), "t_conjunction_d": normal(CONJUNCTIONS_D[0], 0.01),
