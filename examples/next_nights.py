@@ -125,8 +125,8 @@ def table(args):
     best = sum(row["chosen"] < min(row["even"], row["random"]) for row in good)
     ratio = median([row["chosen"] / row["forecast"] for row in good])
     said = (
-        f"On {best} of {len(good)} stars the nights chosen give a smaller sigma_K than both others. What is achieved is "
-        f"{ratio:.2f} of the forecast (median)."
+        f"On {best} of {len(good)} stars the nights chosen give a smaller sigma_K than both others. What is achieved "
+        f"is {ratio:.2f} of the forecast (median)."
     )
     text = f"{calibration_table.table(head.split('; '), lines).rstrip()}\n\n{textwrap.fill(said, 120)}\n"
     text += "".join(f"- {row['seed']:.0f}: {row['error']}\n" for row in rows if row["error"] != "")

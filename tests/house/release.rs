@@ -49,7 +49,8 @@ fn the_support_policy_is_what_is_tested() {
 #[test]
 fn the_crate_has_no_results() {
     let manifest = read("Cargo.toml");
-    let line = manifest.lines().find(|line| line.starts_with("include = [")).expect("a list of what is packed");
+    let list = manifest.split_once("\ninclude = [").expect("a list of what is packed").1;
+    let line = list.split_once(']').expect("its end").0;
     for folder in ["results", "docs", "tests", "benches", "examples", "paper"] {
         assert!(!line.contains(&format!("/{folder}")), "{line}");
     }

@@ -63,8 +63,8 @@ impl Site {
         (DATES_JD[0]..=DATES_JD[1]).contains(&(self.time_zero_jd + time_d))
     }
 
-    /// The longest time (d) without a break in which the star is observable in the night of `time_d`, from local noon to
-    /// noon: first and last moment. `None` where it is not.
+    /// The longest time (d) without a break in which the star is observable in the night of `time_d`, from local noon
+    /// to noon: first and last moment. `None` where it is not.
     pub fn window_d(&self, time_d: f64) -> Option<[f64; 2]> {
         let noon = self.night(time_d) as f64 - self.east();
         let time = |k: usize| noon + k as f64 / STEPS as f64;

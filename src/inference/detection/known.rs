@@ -52,8 +52,8 @@ pub struct KnownAmplitude {
 pub struct Known {
     /// The planets.
     pub planets: Vec<KnownPlanet>,
-    /// Frequency (orbits a rotation cycle) of another planet that was found beside them, whose orbit is left free where K
-    /// is measured.
+    /// Frequency (orbits a rotation cycle) of another planet that was found beside them, whose orbit is left free where
+    /// K is measured.
     pub companion: Option<f64>,
     /// Velocities of the star without each of the planets.
     absent: Vec<VelocityQuadratic>,
