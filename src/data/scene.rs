@@ -168,11 +168,20 @@ impl Scene {
         let contrasts = &contrasts[..];
         let asked = Asked { fitted: &fitted, events, slope, contrasts, nuisances: &nuisances, rotation };
         match calibration::found(&self.imager, values, &known, asked, report) {
-            Ok(FoundStar { star, events, drift_kms_d, contrasts: of_sets, other_rotation, field }) => {
+            Ok(FoundStar { star, events, drift_kms_d, contrasts: of_sets, other_rotation, field, problem }) => {
+                let profiles = problem.map(|error| format!("star not fitted: {error}")).into_iter().collect();
                 let field_start = Some(field);
                 let mut sets = self.measured.sets.clone();
                 contrasts.iter().zip(of_sets).for_each(|(set, contrast)| sets[*set].contrast = Some(contrast));
-                let kept = Measured { star, events, drift_kms_d, other_rotation, field_start, ..Measured::default() };
+                let kept = Measured {
+                    star,
+                    events,
+                    drift_kms_d,
+                    other_rotation,
+                    field_start,
+                    profiles,
+                    ..Measured::default()
+                };
                 self.with_found(&Measured { sets, ..kept })
             }
             Err(error) => {
@@ -226,6 +235,9 @@ impl Scene {
             Some(star) => scene.with_star(star.clone()),
             None => scene,
         };
+        let said: Vec<String> =
+            found.profiles.iter().filter(|text| !scene.measured.profiles.contains(text)).cloned().collect();
+        scene.measured.profiles.extend(said);
         scene.measured.field_start = scene.measured.field_start.or(found.field_start);
         scene.measured.other_rotation = scene.measured.other_rotation.or(found.other_rotation);
         scene = scene.with_contrasts(&found.sets);

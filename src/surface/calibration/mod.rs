@@ -53,6 +53,8 @@ pub struct FoundStar {
     pub other_rotation: Option<OtherRotation>,
     /// Where a fit with finer maps begins.
     pub field: FieldStart,
+    /// Why there is no star, where one was to be fitted.
+    pub problem: Option<NoFit>,
 }
 
 /// What the profiles say of all that is `asked`. Flares would be taken for regions, and regions for flares: events are
@@ -91,7 +93,8 @@ pub fn found(
     let first = events(&imager, values, near)?;
     if asked.fitted.is_empty() {
         let other_rotation = rotation(&imager, values, near, first.as_ref());
-        return Ok(FoundStar { star: None, events: first, drift_kms_d, contrasts, other_rotation, field: near.into() });
+        let (events, field) = (first, near.into());
+        return Ok(FoundStar { star: None, events, drift_kms_d, contrasts, other_rotation, field, problem: None });
     }
     let mut without = imager.clone();
     if let Some(first) = first.as_ref().filter(|first| !first.profiles.is_empty()) {
@@ -99,7 +102,16 @@ pub fn found(
         plain = coarsely(&without, values, *known)?;
     }
     report("fitting active regions");
-    let (star, mut near) = MeasuredStar::of(&without, &plain, known, asked.fitted)?;
+    let (star, mut near) = match MeasuredStar::of(&without, &plain, known, asked.fitted) {
+        Ok(found) => found,
+        // the rest holds without it
+        Err(error) => {
+            let near = plain.marginal.assumed;
+            let other_rotation = rotation(&imager, values, near, first.as_ref());
+            let (events, field, problem) = (first, near.into(), Some(error));
+            return Ok(FoundStar { star: None, events, drift_kms_d, contrasts, other_rotation, field, problem });
+        }
+    };
     star.put_into(&mut imager);
     let mut values = values;
     star.set(&mut values, |parameter| !parameter.is_surface());
@@ -113,7 +125,8 @@ pub fn found(
     }
     let events = if star.numbers.is_empty() { first } else { events(&imager, values, near)? };
     let other_rotation = rotation(&imager, values, near, events.as_ref());
-    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts, other_rotation, field: near.into() })
+    let field = near.into();
+    Ok(FoundStar { star: Some(star), events, drift_kms_d, contrasts, other_rotation, field, problem: None })
 }
 
 /// The same profiles and field `plain` with drifts held where one is steep, and their slopes (km/s per day); no slopes

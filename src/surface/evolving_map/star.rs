@@ -136,7 +136,8 @@ pub fn slopes(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<
 
 /// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
 /// first those of the line, if there are any, then all with a share of the profiles, then with all of them. Where the
-/// share says that they gain less than `needed` in ln Z and ln of their prior, it stays at what it says.
+/// share says that they gain less than `needed` in ln Z and ln of their prior, or maps of all profiles are not found
+/// from there, it stays at what it says.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -178,8 +179,12 @@ pub fn fit_star(
     }
     let of_field = top.of_field.map(|along| along * more);
     let climb = Climb { imager, ..climb };
-    let top = climb.up(climb.condensed_at(&top.point.place, &near.marginal, None)?, Some(of_field))?;
-    Ok(climb.fitted(&top))
+    let whole = climb.condensed_at(&top.point.place, &near.marginal, None);
+    match whole.and_then(|whole| climb.up(whole, Some(of_field))) {
+        // maps of many profiles may be too far from those of another star
+        Err(FieldError::NotSettled { .. }) => Ok(FittedStar { ln_evidence: near.ln_evidence + gain, ..by_few }),
+        top => Ok(climb.fitted(&top?)),
+    }
 }
 
 /// The coordinate of a number of active regions in which the profiles are nearly linear: what their line changes goes
