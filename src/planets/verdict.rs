@@ -153,8 +153,8 @@ pub fn one_sided(z: f64) -> f64 {
 
 impl Verdict {
     /// Of a planet of known ephemeris, with its number (from 1) where there are several: `alone` is K with its error
-    /// where it is not in the model, `signal` where it is, and its 95 % upper limit. The false-alarm probability is that
-    /// of one period, one-sided.
+    /// where it is not in the model, `signal` where it is, and its 95 % upper limit. The false-alarm probability is
+    /// that of one period, one-sided.
     pub fn of_known(
         planet: Option<usize>,
         alone: [f64; 2],

@@ -115,8 +115,8 @@ impl Detection {
         let sigmas = -k_kms / sigma_k_kms;
         (sigmas > NEGATIVE).then(|| {
             Remark::note(format!(
-                "K of the known planet is negative at {sigmas:.1}σ: is its time that of the conjunction with the planet \
-                in front?"
+                "K of the known planet is negative at {sigmas:.1}σ: is its time that of the conjunction with the \
+                planet in front?"
             ))
         })
     }
