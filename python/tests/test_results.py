@@ -154,6 +154,11 @@ def test_a_plan_in_numbers(config: dimcmc.Config) -> None:
             dimcmc.plan(config, **wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="one at least"):
         dimcmc.plan([])
+    chosen = dimcmc.plan(config, maps=1, draws=1000, next=2, period_d=4.0).summary.schedules[0].next
+    assert len(chosen.chosen) == 2 and chosen.chosen[1].sigma_k_kms > 0.0
+    for wrong, words in [({"next": 0}, "next"), ({"next": 2, "nights": [3]}, "nights"), ({"period_d": 3.0}, "only")]:
+        with pytest.raises(ValueError, match=words):
+            dimcmc.plan(config, **wrong)  # type: ignore[arg-type]
 
 
 def test_a_simulation_in_numbers(simulation: dimcmc.Simulation) -> None:
