@@ -1,7 +1,9 @@
-"""The tables of `calibration_changing.py`, and how its lines are kept."""
+"""The tables of `calibration_changing.py`, and how lines of calibrations are kept."""
 
+import argparse
 import csv
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -51,6 +53,35 @@ def append(path, columns, line):
             writer.writeheader()
             writer.writerows(kept)
         writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in line.items()})
+
+
+def command(doc, names, columns, one, table, options=()):
+    """A calibration as a command: `one` makes the line of a star from its seed and the arguments, `table` the note of
+    all lines. `names` are those of folder, table and note, and the number of stars; `options` further arguments of
+    the parser, as a name and what is said of it."""
+    work, lines, note, stars = names
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", help="dimcmc")
+    parser.add_argument("--first", type=int, default=1, help="first seed")
+    parser.add_argument("--stars", type=int, default=stars)
+    parser.add_argument("--work", type=Path, default=Path(work), help="folder of the stars")
+    parser.add_argument("--csv", type=Path, default=Path(lines))
+    parser.add_argument("--out", type=Path, default=Path(note))
+    parser.add_argument("--table", action="store_true", help="write the table of the lines so far")
+    for name, said in options:
+        parser.add_argument(name, help=said)
+    args = parser.parse_args()
+    if args.table:
+        table(args)
+    elif args.program:
+        args.program = str(Path(args.program).resolve())
+        args.work.mkdir(parents=True, exist_ok=True)
+        done = {row["seed"] for row in resumed(args.csv)}
+        for seed in range(args.first, args.first + args.stars):
+            if str(seed) not in done:
+                append(args.csv, columns, one(seed, args))
+    else:
+        parser.error("--program, or --table")
 
 
 def under_the_head(out, title, text):

@@ -10,13 +10,16 @@ ephemerides. `dimcmc periodogram` then says what K is, and `dimcmc limits` how o
 found at a period drawn for each star. `dimcmc inject` puts it in, and another search looks for it. One line per star
 goes to results/calibration/known-planets.csv; the script can be stopped, and goes on. The second command writes
 results/known-planets.md.
+
+With `--simulator stars.py --csv results/calibration/known-planets-physics.csv` stars, spots, lines and the first planet are those of a simulator that shares nothing with
+the program (`stars.py FOLDER --seed N --k KMS`); the second planet is put in by `dimcmc inject`.
 """
 
-import argparse
 import json
 import math
 import random
 import subprocess
+import sys
 import textwrap
 from pathlib import Path
 
@@ -27,6 +30,8 @@ THIRD_KMS = 0.1
 PERIODS_D = (3.0, 12.0)
 PROT_D, INCLINATION, FIRST_D = 2.741, 55.0, 2459002.0
 EPHEMERIS_D = (0.0004, 0.002)
+# of the other simulator
+TIME_ZERO_D = 2459000.0
 COLUMNS = (
     "seed period1_d period2_d k1_kms sigma_k1_kms k2_kms sigma_k2_kms false_alarm jitter_kms period3_d chance found "
     "found_at_d false_alarm3 error"
@@ -35,10 +40,10 @@ COLUMNS = (
 
 def star(rng, seed):
     """The config of a simulation, and what there is to find."""
-    first = PERIODS_D[0] * (PERIODS_D[1] / PERIODS_D[0]) ** rng.random()
+    first = drawn(rng)
     second = first
     while not 1.4 < max(first, second) / min(first, second):
-        second = PERIODS_D[0] * (PERIODS_D[1] / PERIODS_D[0]) ** rng.random()
+        second = drawn(rng)
     planets = sorted([first, second], key=lambda _: rng.random())
     times = [FIRST_D + period * rng.random() for period in planets]
     config = {
@@ -73,6 +78,37 @@ def star(rng, seed):
         },
     }
     return config, planets, times
+
+
+def simulated(rng, seed, folder, run):
+    """A star of `dimcmc simulate`: rotation period, inclination, periods and conjunctions."""
+    config, planets, times = star(rng, seed)
+    (folder / "simulation.json").write_text(json.dumps(config))
+    run("simulate", "simulation.json", "--out", "data", "--force")
+    return PROT_D, INCLINATION, planets, times
+
+
+def of_others(rng, seed, folder, run, simulator):
+    """A star of another simulator, which has the first planet; the second is put in."""
+    words = [sys.executable, simulator, folder / "first", "--seed", seed, "--effect", "none", "--k", K_KMS[0]]
+    subprocess.run(list(map(str, words)), check=True, capture_output=True)
+    truth = json.loads((folder / "first" / "truth.json").read_text())
+    prot, inclination = truth["prot"], truth["inc"]
+    first = prot * truth["porb_over_prot"]
+    second = first
+    while abs(math.log(second / first)) < 0.35 or abs(math.log(second / prot)) < 0.25:
+        second = drawn(rng)
+    run("init", "first/observations.txt", "--rotation-period", prot, "--inclination", inclination, "--out", "first.json")
+    phase, epoch_d = rng.random(), json.loads((folder / "first.json").read_text())["star"]["epoch_d"]
+    orbit = ("--k-kms", K_KMS[1], "--porb-over-prot", second / prot, "--phi", phase)
+    run("inject", "first.json", *orbit, "--out", "data", "--force")
+    # a quarter of an orbit after the largest velocity
+    times = [TIME_ZERO_D + first * (truth["phi"] + 0.25), epoch_d + second * (phase + 0.25)]
+    return prot, inclination, [first, second], times
+
+
+def drawn(rng):
+    return PERIODS_D[0] * (PERIODS_D[1] / PERIODS_D[0]) ** rng.random()
 
 
 def with_ephemerides(config, planets, times):
@@ -113,17 +149,18 @@ def one(seed, args):
     def run(*words):
         subprocess.run([args.program, *map(str, words)], cwd=folder, check=True, capture_output=True, text=True)
 
-    config, planets, times = star(rng, seed)
-    third_d, phase = math.nan, rng.random()
-    # away from both planets and from the rotation
-    near = lambda period: any(abs(math.log(period / other)) < 0.25 for other in (*planets, PROT_D))
-    while not third_d > 0.0 or near(third_d):
-        third_d = PERIODS_D[0] * (PERIODS_D[1] / PERIODS_D[0]) ** rng.random()
-    line |= {"period1_d": planets[0], "period2_d": planets[1], "period3_d": third_d}
     try:
-        (folder / "simulation.json").write_text(json.dumps(config))
-        run("simulate", "simulation.json", "--out", "data", "--force")
-        known = ("--rotation-period", PROT_D, "--inclination", INCLINATION)
+        if args.simulator:
+            prot, inclination, planets, times = of_others(rng, seed, folder, run, Path(args.simulator).resolve())
+        else:
+            prot, inclination, planets, times = simulated(rng, seed, folder, run)
+        third_d, phase = math.nan, rng.random()
+        # away from both planets and from the rotation
+        near = lambda period: any(abs(math.log(period / other)) < 0.25 for other in (*planets, prot))
+        while not third_d > 0.0 or near(third_d):
+            third_d = drawn(rng)
+        line |= {"period1_d": planets[0], "period2_d": planets[1], "period3_d": third_d}
+        known = ("--rotation-period", prot, "--inclination", inclination)
         run("init", "data/observations.txt", *known, "--out", "star.json", "--force")
         config = with_ephemerides(json.loads((folder / "star.json").read_text()), planets, times)
         (folder / "known.json").write_text(json.dumps(config))
@@ -135,9 +172,10 @@ def one(seed, args):
         line["jitter_kms"] = found["field"]["velocity_jitter_kms"]
         run("limits", "known.json", "--out", "limits", "--draws", 1000, "--force")
         line["chance"] = chance(folder / "limits", third_d)
-        orbit = ("--k-kms", THIRD_KMS, "--porb-over-prot", third_d / PROT_D, "--phi", phase)
+        orbit = ("--k-kms", THIRD_KMS, "--porb-over-prot", third_d / prot, "--phi", phase)
         run("inject", "known.json", *orbit, "--out", "injected", "--force")
-        other = with_data_of(config, json.loads((folder / "injected" / "config.json").read_text()))
+        injected = json.loads((folder / "injected" / "config.json").read_text())
+        other = config | {"observations": injected["observations"]}
         (folder / "injected" / "known.json").write_text(json.dumps(other))
         run("periodogram", "injected/known.json", "--out", "third", "--draws", 1000, "--force")
         found = json.loads((folder / "third" / "periodogram.json").read_text())
@@ -149,57 +187,44 @@ def one(seed, args):
     return line
 
 
-def with_data_of(config, injected):
-    return config | {"observations": injected["observations"]}
-
-
 def table(args):
-    rows = [
-        {name: calibration_table.number(value) for name, value in row.items()}
-        for row in calibration_table.read(args.csv)
-    ]
-    good = [row for row in rows if row["error"] == ""]
-    lines = []
-    for number, k in enumerate(K_KMS, 1):
-        pulls = [(row[f"k{number}_kms"] - k) / row[f"sigma_k{number}_kms"] for row in good]
-        inside = [sum(abs(pull) < bound for pull in pulls) for bound in (1.0, 1.96)]
-        mean = sum(pulls) / len(pulls)
-        scatter = math.sqrt(sum(pull * pull for pull in pulls) / len(pulls))
-        sigma = sorted(row[f"sigma_k{number}_kms"] for row in good)[len(good) // 2]
-        lines.append([f"{1000 * k:.0f}", len(good), *inside, f"{mean:.2f}", f"{scatter:.2f}", f"{1000 * sigma:.0f}"])
-    head = "K (m/s); stars; within 68 %; within 95 %; mean pull; rms pull; median sigma_K (m/s)"
-    expected = sum(row["chance"] for row in good)
-    error = math.sqrt(sum(row["chance"] * (1.0 - row["chance"]) for row in good))
-    values = [row["false_alarm"] for row in good]
-    p = calibration_table.kolmogorov_smirnov(values)[1]
-    said = (
-        f"A third planet of {1000 * THIRD_KMS:.0f} m/s, at periods away from those of both and from the rotation, is "
-        f"found in {sum(row['found'] for row in good):.0f} of {len(good)} stars; `limits` expects {expected:.1f} ± "
-        f"{error:.1f}. Without it the lowest FAP of the blind search is {min(values):.2g} (KS p = {p:.2g})."
-    )
-    text = f"{calibration_table.table(head.split('; '), lines).rstrip()}\n\n{textwrap.fill(said, 120)}\n"
-    text += "".join(f"- {row['seed']:.0f}: {row['error']}\n" for row in rows if row["error"] != "")
+    lines, said, failed = [], [], []
+    for name, path in (("dimcmc", args.csv), ("other", args.csv.with_stem(f"{args.csv.stem}-physics"))):
+        read = calibration_table.read(path)
+        rows = [{key: calibration_table.number(value) for key, value in row.items()} for row in read]
+        good = [row for row in rows if row["error"] == ""]
+        failed += [f"- {name}, {row['seed']:.0f}: {row['error']}\n" for row in rows if row["error"] != ""]
+        if good:
+            lines += [of_planet(name, number, k, good) for number, k in enumerate(K_KMS, 1)]
+            said.append(of_third(name, good))
+    head = "simulator; K (m/s); stars; within 68 %; within 95 %; mean pull; rms pull; median sigma_K (m/s)"
+    said = "\n\n".join(textwrap.fill(each, 120) for each in said)
+    text = f"{calibration_table.table(head.split('; '), lines).rstrip()}\n\n{said}\n" + "".join(failed)
     calibration_table.under_the_head(args.out, "Two transiting planets", text)
 
 
+def of_planet(name, number, k, rows):
+    pulls = [(row[f"k{number}_kms"] - k) / row[f"sigma_k{number}_kms"] for row in rows]
+    inside = [sum(abs(pull) < bound for pull in pulls) for bound in (1.0, 1.96)]
+    mean = sum(pulls) / len(pulls)
+    scatter = math.sqrt(sum(pull * pull for pull in pulls) / len(pulls))
+    sigma = sorted(row[f"sigma_k{number}_kms"] for row in rows)[len(rows) // 2]
+    return [name, f"{1000 * k:.0f}", len(rows), *inside, f"{mean:.2f}", f"{scatter:.2f}", f"{1000 * sigma:.0f}"]
+
+
+def of_third(name, rows):
+    expected = sum(row["chance"] for row in rows)
+    error = math.sqrt(sum(row["chance"] * (1.0 - row["chance"]) for row in rows))
+    values = [row["false_alarm"] for row in rows]
+    p = calibration_table.kolmogorov_smirnov(values)[1]
+    return (
+        f"Simulator {name}: a third planet of {1000 * THIRD_KMS:.0f} m/s, at periods away from those of both and from "
+        f"the rotation, is found in {sum(row['found'] for row in rows):.0f} of {len(rows)} stars; `limits` expects "
+        f"{expected:.1f} ± {error:.1f}. Without it the lowest FAP of the blind search is {min(values):.2g} (KS p = "
+        f"{p:.2g})."
+    )
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", help="dimcmc")
-    parser.add_argument("--first", type=int, default=1, help="first seed")
-    parser.add_argument("--stars", type=int, default=40)
-    parser.add_argument("--work", type=Path, default=Path("target/known-planets"), help="folder of the stars")
-    parser.add_argument("--csv", type=Path, default=Path("results/calibration/known-planets.csv"))
-    parser.add_argument("--out", type=Path, default=Path("results/known-planets.md"))
-    parser.add_argument("--table", action="store_true", help="write the table of the lines so far")
-    args = parser.parse_args()
-    if args.table:
-        table(args)
-    elif args.program:
-        args.program = str(Path(args.program).resolve())
-        args.work.mkdir(parents=True, exist_ok=True)
-        done = {row["seed"] for row in calibration_table.resumed(args.csv)}
-        for seed in range(args.first, args.first + args.stars):
-            if str(seed) not in done:
-                calibration_table.append(args.csv, COLUMNS, one(seed, args))
-    else:
-        parser.error("--program, or --table")
+    names = ("target/known-planets", "results/calibration/known-planets.csv", "results/known-planets.md", 40)
+    calibration_table.command(__doc__, names, COLUMNS, one, table, [("--simulator", "stars.py")])

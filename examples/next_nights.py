@@ -11,13 +11,11 @@ is compared. One line per star goes to results/calibration/next-nights.csv; the 
 end of results/plan.md.
 """
 
-import argparse
 import json
 import math
 import random
 import subprocess
 import textwrap
-from pathlib import Path
 
 import calibration_table
 
@@ -134,23 +132,5 @@ def table(args):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", help="dimcmc")
-    parser.add_argument("--first", type=int, default=1, help="first seed")
-    parser.add_argument("--stars", type=int, default=30)
-    parser.add_argument("--work", type=Path, default=Path("target/next-nights"), help="folder of the stars")
-    parser.add_argument("--csv", type=Path, default=Path("results/calibration/next-nights.csv"))
-    parser.add_argument("--out", type=Path, default=Path("results/plan.md"))
-    parser.add_argument("--table", action="store_true", help="write the table of the lines so far")
-    args = parser.parse_args()
-    if args.table:
-        table(args)
-    elif args.program:
-        args.program = str(Path(args.program).resolve())
-        args.work.mkdir(parents=True, exist_ok=True)
-        done = {row["seed"] for row in calibration_table.resumed(args.csv)}
-        for seed in range(args.first, args.first + args.stars):
-            if str(seed) not in done:
-                calibration_table.append(args.csv, COLUMNS, one(seed, args))
-    else:
-        parser.error("--program, or --table")
+    names = ("target/next-nights", "results/calibration/next-nights.csv", "results/plan.md", 30)
+    calibration_table.command(__doc__, names, COLUMNS, one, table)

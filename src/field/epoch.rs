@@ -35,6 +35,22 @@ pub struct Epoch {
 }
 
 impl Epoch {
+    /// A single datum at a time (d), beside no nuisances or slopes: the derivative of the model (1, H), data minus model,
+    /// standard error, and what it has of each number in common (1, numbers).
+    pub fn of_datum(time_d: f64, row: DMatrix<f64>, misfit: f64, sigma: f64, common: DMatrix<f64>) -> Self {
+        Epoch {
+            time_d,
+            jacobian: row.into(),
+            misfit: DVector::from_element(1, misfit),
+            variance: DVector::from_element(1, sigma * sigma),
+            nuisances: DMatrix::zeros(1, 0),
+            beside: 0.0,
+            slopes: DMatrix::zeros(1, 0),
+            common,
+            divisor: DVector::zeros(0),
+        }
+    }
+
     /// Number of data.
     pub fn len(&self) -> usize {
         self.misfit.len()

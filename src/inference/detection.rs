@@ -13,7 +13,7 @@ mod known;
 mod remarks;
 mod robustness;
 
-pub use known::{Known, KnownPlanet};
+pub use known::{KnownPlanet, KnownPlanets};
 pub use remarks::Evidence;
 pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, robustness};
 
@@ -98,7 +98,7 @@ pub struct Detection {
     /// Another rotation period with which the profiles are far more probable.
     pub other_rotation: Option<OtherRotation>,
     /// Planets of known ephemeris.
-    pub known: Known,
+    pub known: KnownPlanets,
     /// The likelihood of the velocities of the star without these; `None` where there are none.
     alone: Option<Jitters>,
     /// Without a planet but those.
@@ -158,7 +158,7 @@ fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
 #[derive(Clone, Debug)]
 pub struct PlanetFree {
     /// Planets of known ephemeris, which it has.
-    pub known: Known,
+    pub known: KnownPlanets,
     /// The likelihood of the velocities of the star without these; `None` where there are none.
     pub alone: Option<Jitters>,
     /// The star.
@@ -183,64 +183,39 @@ impl PlanetFree {
     ) -> Result<Self, SurfaceError> {
         report(Stage::PlanetFree);
         at.values.set(Parameter::K, 0.0);
-        let mut here = surface.linearise(at, None)?;
+        let here = surface.linearise(at, None)?;
+        let none = KnownPlanets::default();
         if settings.known.is_empty() {
-            return PlanetFree::of(surface, at, here, frequencies, settings.search, report);
+            return PlanetFree::of(surface, at, (here, none), frequencies, settings.search, report);
         }
         report(Stage::Known);
         let without_jitter = surface.without_jitter(at, &here)?;
-        let alone = jitters(&here, without_jitter.as_ref());
-        let known = Known::absent(&settings.known, &here, without_jitter.as_ref());
+        let alone = none.jitters(&here, without_jitter.as_ref());
+        let known = KnownPlanets::absent(&settings.known, &here, without_jitter.as_ref());
         known.write(&mut at.values);
-        here = known.whole(surface.linearise(at, Some(&here))?, &at.values);
+        let here = known.whole(surface.linearise(at, Some(&here))?, &at.values);
         let known = known.present(&here.quadratic);
-        let found = PlanetFree::beside(known, surface, at, here, frequencies, settings.search, report)?;
+        let found = PlanetFree::of(surface, at, (here, known), frequencies, settings.search, report)?;
         Ok(PlanetFree { alone: Some(alone), ..found })
     }
 
-    /// Of the star in `at`, without an orbit, that is linearised `here`.
+    /// Of the star in `at`, without an orbit but those of `known` planets, that is linearised `here`.
     ///
     /// # Errors
     /// [`SurfaceError`].
     pub fn of(
         surface: &dyn SurfaceModel,
         at: At,
-        here: Linearised,
-        frequencies: &Frequencies,
-        settings: SearchSettings,
-        report: &dyn Fn(Stage),
-    ) -> Result<Self, SurfaceError> {
-        PlanetFree::beside(Known::default(), surface, at, here, frequencies, settings, report)
-    }
-
-    /// The same, the star having `known` planets.
-    fn beside(
-        known: Known,
-        surface: &dyn SurfaceModel,
-        at: At,
-        here: Linearised,
+        (here, known): (Linearised, KnownPlanets),
         frequencies: &Frequencies,
         settings: SearchSettings,
         report: &dyn Fn(Stage),
     ) -> Result<Self, SurfaceError> {
         report(Stage::Search);
         let without_jitter = surface.without_jitter(at, &here)?;
-        let jitters = jitters_beside(&known, &here, without_jitter.as_ref());
+        let jitters = known.jitters(&here, without_jitter.as_ref());
         let blind = imitated(surface, Search::with_jitter(&jitters, frequencies, settings)?);
         Ok(PlanetFree { known, alone: None, here, without_jitter, blind })
-    }
-}
-
-/// The likelihood of the velocities of the star `here`, beside the jitter if the profiles say how large it is.
-pub fn jitters(here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
-    without_jitter.map_or_else(|| Jitters::none(&here.quadratic), WithoutJitter::jitters)
-}
-
-/// The same with the orbits of `known` planets left free.
-pub fn jitters_beside(known: &Known, here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
-    match without_jitter {
-        Some(without) => without.beside(&known.beside(&without.here.quadratic)),
-        None => Jitters::none(&known.beside(&here.quadratic)),
     }
 }
 
@@ -311,7 +286,8 @@ impl Detection {
 
     /// The likelihood of the velocities of the star without a planet, known ones included.
     pub fn jitters(&self) -> Jitters {
-        self.alone.clone().unwrap_or_else(|| jitters(&self.planet_free, self.without_jitter.as_ref()))
+        let none = KnownPlanets::default();
+        self.alone.clone().unwrap_or_else(|| none.jitters(&self.planet_free, self.without_jitter.as_ref()))
     }
 
     /// The last expansion.
@@ -336,7 +312,7 @@ impl Detection {
     fn best_velocities(&self, cycles: &[f64]) -> DVector<f64> {
         let CircularOrbit { k_kms, phi, .. } = self.best.orbit;
         match self.known.first() {
-            Some(planet) => k_kms * planet.unit_velocities(cycles),
+            Some(planet) => k_kms * planet.ephemeris.unit_velocities(cycles),
             None => {
                 let orbit = Orbit { k_kms, porb_over_prot: self.best.porb_over_prot, phi };
                 DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles))

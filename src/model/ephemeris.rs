@@ -2,6 +2,7 @@
 
 use super::{Clock, Element, Elements, FreeParameter, Parameter, ParameterValues, Prior, period_prior};
 use crate::star::Shape;
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 /// A known ephemeris.
@@ -63,13 +64,18 @@ impl Ephemeris {
         self.of().set_conjunction(values, conjunction_d, self.clock);
     }
 
-    /// Velocities (km/s) of an orbit of K = 1 km/s with that period and conjunction (d), at rotation `cycles`.
-    pub fn unit_velocities(&self, period_d: f64, conjunction_d: f64, cycles: &[f64]) -> Vec<f64> {
+    /// Velocities (km/s) of an orbit of K = 1 km/s at the ephemeris as given, at rotation `cycles`.
+    pub fn unit_velocities(&self, cycles: &[f64]) -> DVector<f64> {
+        self.unit_velocities_at(self.period_d[0], self.conjunction_d[0], cycles)
+    }
+
+    /// The same with that period and conjunction (d).
+    pub fn unit_velocities_at(&self, period_d: f64, conjunction_d: f64, cycles: &[f64]) -> DVector<f64> {
         let mut values = ParameterValues::of_eight([0.0; 8]);
         self.write_at(period_d, conjunction_d, &mut values);
         let orbit = values.orbit_mut(self.planet);
         orbit.set(Element::Amplitude, 1.0);
         let orbit = orbit.eccentric();
-        cycles.iter().map(|cycle| orbit.velocity_kms(*cycle)).collect()
+        DVector::from_iterator(cycles.len(), cycles.iter().map(|cycle| orbit.velocity_kms(*cycle)))
     }
 }

@@ -7,7 +7,7 @@ use crate::data::io::atomic::WriteError;
 use crate::data::io::map::{FILES, LIGHT_CURVES, MapResult};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
-use crate::inference::detection::PlanetFree;
+use crate::inference::detection::{KnownPlanets, PlanetFree};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::verdict::{CANDIDATE_FAP, false_alarm};
@@ -173,7 +173,8 @@ impl FreeVelocities {
         let frequencies = options.frequencies(scene).ok()?;
         let at = At { imager: &scene.imager, values, nuisances };
         let surface = scene.surface().model();
-        let search = PlanetFree::of(&*surface, at, here.clone(), &frequencies, settings.search, &|_| ()).ok()?.blind;
+        let star = (here.clone(), KnownPlanets::default());
+        let search = PlanetFree::of(&*surface, at, star, &frequencies, settings.search, &|_| ()).ok()?.blind;
         let peak = search.best();
         Some((*peak, search.false_alarm.probability(peak.orbit.delta_ln_l).value()))
     }

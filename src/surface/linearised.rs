@@ -60,12 +60,7 @@ pub struct WithoutJitter {
 }
 
 impl WithoutJitter {
-    /// The likelihood of the velocities beside jitters of several sizes.
-    pub fn jitters(&self) -> Jitters {
-        self.beside(&self.here.quadratic)
-    }
-
-    /// The same of other velocities of this star.
+    /// The likelihood of these velocities of this star beside jitters of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
         match self.found_kms > 0.0 {
             true => Jitters::new(quadratic, self.found_kms, self.scale_kms),

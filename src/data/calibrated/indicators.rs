@@ -1,12 +1,11 @@
 //! The activity indicators of a config, brought to few values.
 
-use super::light_curves::{far_from_profiles, remembered_d};
+use super::light_curves::{far_from_profiles, remembered_d, with_tables};
 use crate::data::config::{ConfigError, IndicatorSettings, Settings};
 use crate::data::dataset::is_within;
 use crate::data::io::light_curve::Measurements;
 use crate::star::observation::Observations;
 use crate::surface::photometry::{Flux, bin_width_d, in_bins};
-use sha2::{Digest, Sha256};
 
 /// Fewest values of an indicator: level, slope, gain and jitter are fitted to them; ...
 const FEWEST: usize = 6;
@@ -69,16 +68,6 @@ fn used_of(
 
 /// The fingerprint of all other observations with that of the indicators, where there are any.
 pub(super) fn fingerprint(others: String, indicators: &[Vec<Flux>]) -> String {
-    if indicators.is_empty() {
-        return others;
-    }
-    let mut hash = Sha256::new();
-    hash.update(others);
-    for values in indicators {
-        hash.update((values.len() as u64).to_le_bytes());
-        for one in values {
-            [one.time_d, one.flux, one.sigma].iter().for_each(|x| hash.update(x.to_le_bytes()));
-        }
-    }
-    format!("{:x}", hash.finalize())
+    let rows = |values: &Vec<Flux>| values.iter().map(|one| [one.time_d, one.flux, one.sigma]).collect();
+    with_tables(others, &indicators.iter().map(rows).collect::<Vec<Vec<_>>>())
 }

@@ -197,16 +197,22 @@ impl Binned {
 
 /// The fingerprint of the observations with that of the light curves, where there are any.
 pub(super) fn fingerprint(profiles: String, curves: &[Binned]) -> String {
-    if curves.is_empty() {
-        return profiles;
+    let rows = |Binned { curve, .. }: &Binned| {
+        curve.bins.iter().map(|bin| [bin.time_d, bin.spread_d, bin.flux, bin.sigma]).collect()
+    };
+    with_tables(profiles, &curves.iter().map(rows).collect::<Vec<Vec<_>>>())
+}
+
+/// The fingerprint of other observations with that of tables of numbers, where there are any.
+pub(super) fn with_tables<const N: usize>(others: String, tables: &[Vec<[f64; N]>]) -> String {
+    if tables.is_empty() {
+        return others;
     }
     let mut hash = Sha256::new();
-    hash.update(profiles);
-    for Binned { curve, .. } in curves {
-        hash.update((curve.bins.len() as u64).to_le_bytes());
-        for bin in &curve.bins {
-            [bin.time_d, bin.spread_d, bin.flux, bin.sigma].iter().for_each(|x| hash.update(x.to_le_bytes()));
-        }
+    hash.update(others);
+    for rows in tables {
+        hash.update((rows.len() as u64).to_le_bytes());
+        rows.iter().flatten().for_each(|x| hash.update(x.to_le_bytes()));
     }
     format!("{:x}", hash.finalize())
 }

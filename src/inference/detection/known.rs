@@ -49,7 +49,7 @@ pub struct KnownAmplitude {
 
 /// All planets of known ephemeris of a star.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Known {
+pub struct KnownPlanets {
     /// The planets.
     pub planets: Vec<KnownPlanet>,
     /// Frequency (orbits a rotation cycle) of another planet that was found beside them, whose orbit is left free where
@@ -59,11 +59,11 @@ pub struct Known {
     absent: Vec<VelocityQuadratic>,
 }
 
-impl Known {
+impl KnownPlanets {
     /// The star `here` without them: K of each with the others' free; where a jitter is fitted, beside that of a star
     /// that has the others.
     pub fn absent(ephemerides: &[Ephemeris], here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Self {
-        Known::of(ephemerides, |ephemeris| match (ephemerides, without_jitter) {
+        KnownPlanets::of(ephemerides, |ephemeris| match (ephemerides, without_jitter) {
             // of a single one as the star is
             ([_, _, ..], Some(without)) => {
                 let rest = beside(others(ephemerides, ephemeris), &without.here.quadratic);
@@ -78,10 +78,10 @@ impl Known {
         let absent: Vec<VelocityQuadratic> = ephemerides.iter().map(rest).collect();
         let planet = |(ephemeris, rest): (&Ephemeris, &VelocityQuadratic)| KnownPlanet {
             ephemeris: *ephemeris,
-            alone: rest.amplitude(&unit(ephemeris, rest)),
+            alone: rest.amplitude(&ephemeris.unit_velocities(&rest.cycles)),
             k: None,
         };
-        Known { planets: ephemerides.iter().zip(&absent).map(planet).collect(), companion: None, absent }
+        KnownPlanets { planets: ephemerides.iter().zip(&absent).map(planet).collect(), companion: None, absent }
     }
 
     /// The same where another planet was found at that frequency (orbits a rotation cycle): K of each, alone and by the
@@ -91,7 +91,7 @@ impl Known {
         self.companion = Some(frequency);
         for (planet, rest) in self.planets.iter_mut().zip(&self.absent) {
             let rest = without(rest, frequency).unwrap_or_else(|| rest.clone());
-            planet.alone = rest.amplitude(&unit(&planet.ephemeris, &rest));
+            planet.alone = rest.amplitude(&planet.ephemeris.unit_velocities(&rest.cycles));
         }
         self.present(quadratic)
     }
@@ -117,13 +117,12 @@ impl Known {
     /// The same with what the star with them says of K.
     #[must_use]
     pub fn present(mut self, quadratic: &VelocityQuadratic) -> Self {
-        let ephemerides: Vec<Ephemeris> = self.ephemerides().collect();
-        for planet in &mut self.planets {
-            let rest = beside(others(&ephemerides, &planet.ephemeris), quadratic);
-            let rest = self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned);
-            planet.k = over_errors(&rest, &planet.ephemeris)
-                .map(|k| KnownAmplitude { moments: k.moments(), upper95: k.upper95() });
-        }
+        let amplitude = |planet: &KnownPlanet| {
+            let k = over_errors(&self.beside_others(planet, quadratic), &planet.ephemeris)?;
+            Some(KnownAmplitude { moments: k.moments(), upper95: k.upper95() })
+        };
+        let all: Vec<Option<KnownAmplitude>> = self.planets.iter().map(amplitude).collect();
+        self.planets.iter_mut().zip(all).for_each(|(planet, k)| planet.k = k);
         self
     }
 
@@ -143,9 +142,18 @@ impl Known {
         planet: &KnownPlanet,
         quadratic: &'a VelocityQuadratic,
     ) -> Cow<'a, VelocityQuadratic> {
-        let others = self.ephemerides().filter(|of| of.planet != planet.ephemeris.planet);
-        let rest = beside(others, quadratic);
+        let all: Vec<Ephemeris> = self.ephemerides().collect();
+        let rest = beside(others(&all, &planet.ephemeris), quadratic);
         self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned)
+    }
+
+    /// The likelihood of the velocities of the star `here` with the orbits of all left free, beside the jitter where the
+    /// profiles say how large it is.
+    pub fn jitters(&self, here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
+        match without_jitter {
+            Some(without) => without.beside(&self.beside(&without.here.quadratic)),
+            None => Jitters::none(&self.beside(&here.quadratic)),
+        }
     }
 
     /// The columns that are left free, profiles x amplitudes; `None` where there is no such planet.
@@ -166,7 +174,8 @@ impl Known {
         jitters: &dyn Fn(&VelocityQuadratic) -> Jitters,
     ) -> Option<CircularOrbit> {
         let rest = self.beside_others(planet, quadratic);
-        let [k_kms, sigma_k_kms, delta_ln_l] = jitters(&rest).amplitude(&unit(&planet.ephemeris, quadratic));
+        let [k_kms, sigma_k_kms, delta_ln_l] =
+            jitters(&rest).amplitude(&planet.ephemeris.unit_velocities(&rest.cycles));
         let CircularOrbit { phi, sigma_phi, .. } = planet.orbit();
         let delta_ln_l = if k_kms > 0.0 { delta_ln_l } else { delta_ln_l.min(0.0) };
         delta_ln_l.is_finite().then_some(CircularOrbit { k_kms, sigma_k_kms, phi, sigma_phi, delta_ln_l })
@@ -208,21 +217,10 @@ impl KnownPlanet {
             imitation: None,
         }
     }
-
-    /// Its velocities for K = 1 km/s.
-    pub fn unit_velocities(&self, cycles: &[f64]) -> DVector<f64> {
-        let Ephemeris { period_d: [period_d, _], conjunction_d: [conjunction_d, _], .. } = self.ephemeris;
-        DVector::from_vec(self.ephemeris.unit_velocities(period_d, conjunction_d, cycles))
-    }
 }
 
 fn others<'a>(all: &'a [Ephemeris], but: &'a Ephemeris) -> impl Iterator<Item = Ephemeris> + 'a {
     all.iter().filter(|of| of.planet != but.planet).copied()
-}
-
-fn unit(ephemeris: &Ephemeris, quadratic: &VelocityQuadratic) -> DVector<f64> {
-    let Ephemeris { period_d: [period_d, _], conjunction_d: [conjunction_d, _], .. } = *ephemeris;
-    DVector::from_vec(ephemeris.unit_velocities(period_d, conjunction_d, &quadratic.cycles))
 }
 
 fn beside(ephemerides: impl Iterator<Item = Ephemeris>, quadratic: &VelocityQuadratic) -> Cow<'_, VelocityQuadratic> {
@@ -238,7 +236,7 @@ fn columns(ephemerides: impl Iterator<Item = Ephemeris>, cycles: &[f64]) -> Opti
             ephemeris;
         let at = |of_period: f64, of_conjunction: f64| {
             let (period, conjunction) = (period + of_period, conjunction + of_conjunction);
-            DVector::from_vec(ephemeris.unit_velocities(period, conjunction, cycles))
+            ephemeris.unit_velocities_at(period, conjunction, cycles)
         };
         columns.push(at(0.0, 0.0));
         if conjunction_sd > SMALL_ERROR * period {
@@ -258,8 +256,8 @@ fn over_errors(quadratic: &VelocityQuadratic, ephemeris: &Ephemeris) -> Option<M
     let mut parts = Vec::new();
     for (period_d, of_period) in within(ephemeris.period_d) {
         for (conjunction_d, of_conjunction) in within(ephemeris.conjunction_d) {
-            let unit = ephemeris.unit_velocities(period_d, conjunction_d, &quadratic.cycles);
-            let [mean, sd] = quadratic.amplitude(&DVector::from_vec(unit));
+            let unit = ephemeris.unit_velocities_at(period_d, conjunction_d, &quadratic.cycles);
+            let [mean, sd] = quadratic.amplitude(&unit);
             // the integral over all K of how well the orbit fits
             parts.push(Part { ln_weight: of_period + of_conjunction + 0.5 * (mean / sd).powi(2) + sd.ln(), mean, sd });
         }
@@ -294,8 +292,7 @@ mod tests {
         let information = DMatrix::identity(30, 30) / 0.05f64.powi(2);
         let mut velocities = DVector::zeros(30);
         for (ephemeris, k_kms) in orbits {
-            let [of_period, of_conjunction] = [ephemeris.period_d[0], ephemeris.conjunction_d[0]];
-            velocities += *k_kms * DVector::from_vec(ephemeris.unit_velocities(of_period, of_conjunction, &cycles));
+            velocities += *k_kms * ephemeris.unit_velocities(&cycles);
         }
         VelocityQuadratic { gradient: &information * velocities, cycles, information }
     }
@@ -306,7 +303,7 @@ mod tests {
     fn an_ephemeris_that_is_off_leaves_k_as_it_is() {
         let quadratic = quadratic(&[(ephemeris(0, 5.0, [7.8, 0.0]), 0.1)]);
         let given = ephemeris(0, 5.0, [7.0, 0.4]);
-        let [there, _] = quadratic.amplitude(&unit(&given, &quadratic));
+        let [there, _] = quadratic.amplitude(&given.unit_velocities(&quadratic.cycles));
         let k = over_errors(&quadratic, &given).unwrap();
         let [mean, sd] = k.moments();
         assert!((there / 0.1 - 0.54).abs() < 0.03, "{there}");
@@ -316,7 +313,7 @@ mod tests {
         assert!((alone - there).abs() < 1e-12);
         assert!(k.upper95() > 0.11 && k.upper95() < 0.14, "{}", k.upper95());
         // what the error adds is left free: no orbit remains
-        let known = Known::of(&[given], |_| quadratic.clone());
+        let known = KnownPlanets::of(&[given], |_| quadratic.clone());
         let rest = known.beside(&quadratic);
         let left = rest.gradient.norm() / quadratic.gradient.norm();
         assert!(left < 0.15, "{left}");
@@ -342,7 +339,7 @@ mod tests {
     fn a_negative_k_is_no_planet() {
         let planet = ephemeris(0, 5.0, [7.0, 0.0]);
         let quadratic = quadratic(&[(planet, -0.1)]);
-        let known = Known::of(&[planet], |_| quadratic.clone()).present(&quadratic);
+        let known = KnownPlanets::of(&[planet], |_| quadratic.clone()).present(&quadratic);
         let orbit = known.orbit_of(&known.planets[0], &quadratic, &Jitters::none).unwrap();
         assert!((orbit.k_kms + 0.1).abs() < 1e-12 && orbit.delta_ln_l == 0.0);
         assert_eq!(known.planets[0].orbit().delta_ln_l, 0.0);
@@ -353,8 +350,8 @@ mod tests {
     fn k_is_measured_beside_a_companion() {
         let (b, c) = (ephemeris(0, 5.0, [7.0, 0.0]), ephemeris(1, 9.1, [3.0, 0.0]));
         let quadratic = quadratic(&[(b, 0.06), (c, 0.3)]);
-        let known = Known::of(&[b], |_| quadratic.clone()).present(&quadratic);
-        let off = |known: &Known| (known.planets[0].k.unwrap().moments[0] - 0.06).abs();
+        let known = KnownPlanets::of(&[b], |_| quadratic.clone()).present(&quadratic);
+        let off = |known: &KnownPlanets| (known.planets[0].k.unwrap().moments[0] - 0.06).abs();
         let beside = known.clone().with_companion(2.0 / 9.1, &quadratic);
         assert!(off(&known) > 1e-3 && off(&beside) < 1e-9, "{} {}", off(&known), off(&beside));
         assert!((beside.planets[0].alone[0] - 0.06).abs() < 1e-9);
@@ -367,7 +364,7 @@ mod tests {
         let quadratic = quadratic(&[(b, 0.06), (c, 0.04)]);
         let both = [b, c];
         let rest = |of: &Ephemeris| beside(others(&both, of), &quadratic).into_owned();
-        let known = Known::of(&both, rest).present(&quadratic);
+        let known = KnownPlanets::of(&both, rest).present(&quadratic);
         for (planet, k) in known.planets.iter().zip([0.06, 0.04]) {
             let [mean, sd] = planet.k.unwrap().moments;
             assert!((planet.alone[0] - k).abs() < 1e-12 && (mean - k).abs() < 1e-9 && sd > 0.012, "{planet:?}");
@@ -375,7 +372,7 @@ mod tests {
             assert!((orbit.k_kms - k).abs() < 1e-12 && orbit.delta_ln_l > 1.0, "{orbit:?}");
         }
         assert!(known.beside(&quadratic).gradient.norm() < 1e-9 * quadratic.gradient.norm());
-        let [alone, _] = quadratic.amplitude(&unit(&b, &quadratic));
+        let [alone, _] = quadratic.amplitude(&b.unit_velocities(&quadratic.cycles));
         assert!((alone - 0.06).abs() > 1e-4, "{alone}");
     }
 }

@@ -86,7 +86,7 @@ impl Tried<'_> {
                 let orbit = Orbit { k_kms, porb_over_prot: peak.porb_over_prot, phi };
                 DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles))
             }
-            Tried::Known(planet) => k_kms * planet.unit_velocities(cycles),
+            Tried::Known(planet) => k_kms * planet.ephemeris.unit_velocities(cycles),
         }
     }
 }

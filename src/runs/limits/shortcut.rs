@@ -4,7 +4,7 @@
 //! that is not in the model. A planet that the profiles show as they are is taken out first, with the spots as they are
 //! beside it.
 
-use crate::inference::detection::{Detection, DetectionSettings, jitters_beside};
+use crate::inference::detection::{Detection, DetectionSettings};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::injections::Highest;
 use crate::planets::periodogram::orbits::{Trial, scan};
@@ -123,7 +123,7 @@ impl<'a> Shortcut<'a> {
                 here.expansion = with(&here.expansion, &orbit);
                 here.quadratic = surface.velocities(&here.expansion, &detection.nuisances).ok_or(Unbounded)?;
             }
-            let jitters = jitters_beside(&found.known, &star, without_jitter.as_ref());
+            let jitters = found.known.jitters(&star, without_jitter.as_ref());
             before = Search::with_jitter(&jitters, frequencies, detection.search)?;
             removed = Some(orbit);
         }

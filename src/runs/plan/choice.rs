@@ -121,10 +121,7 @@ impl Weighed<'_> {
         let mut sums = [0.0; 2];
         for maps in &self.maps {
             let quadratic = &self.planned.velocities(maps, std::slice::from_ref(&part))?[0];
-            let unit = |of: &Ephemeris| {
-                let unit = of.unit_velocities(of.period_d[0], of.conjunction_d[0], &quadratic.cycles);
-                DVector::from_vec(unit)
-            };
+            let unit = |of: &Ephemeris| of.unit_velocities(&quadratic.cycles);
             let columns: Vec<DVector<f64>> = self.others.iter().map(unit).collect();
             let rest = if columns.is_empty() { None } else { quadratic.beside(&DMatrix::from_columns(&columns)) };
             let quadratic = rest.as_ref().unwrap_or(quadratic);
@@ -157,9 +154,8 @@ impl Aim {
     /// (s^2/km^2); infinite where it is not bounded.
     fn variance(&self, quadratic: &VelocityQuadratic, rotation_period_d: f64, prior: f64) -> f64 {
         let found = match self {
-            Aim::Amplitude { period_d, ephemeris: Some(known) } => {
-                let unit = known.unit_velocities(*period_d, known.conjunction_d[0], &quadratic.cycles);
-                let alone = quadratic.amplitude(&DVector::from_vec(unit))[1].powi(-2);
+            Aim::Amplitude { ephemeris: Some(known), .. } => {
+                let alone = quadratic.amplitude(&known.unit_velocities(&quadratic.cycles))[1].powi(-2);
                 Some((alone + prior).recip())
             }
             Aim::Amplitude { period_d, ephemeris: None } => {

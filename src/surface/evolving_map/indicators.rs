@@ -12,6 +12,7 @@
 
 use super::{Basis, Marginal};
 use crate::field::Epoch;
+use crate::planets::verdict::decimals;
 use crate::star::{Band, StarState};
 use crate::surface::imaging::Imager;
 use crate::surface::indicator::{Indicator, Reading, Scale};
@@ -68,8 +69,7 @@ impl FittedIndicator {
                 "{name}: {values} values, not used: no significant gain (Δln Z = {ln_bayes:.1}, threshold {NEEDED})"
             );
         }
-        // two digits of the error
-        let digits = (1.0 - sigma_gain.log10().floor()).clamp(0.0, 9.0) as usize;
+        let digits = decimals(*sigma_gain);
         format!(
             "{name}: {values} values, gain {gain:.digits$} ± {sigma_gain:.digits$} per filling factor \
             (Δln Z = {ln_bayes:.1}), jitter {jitter:.2e}"
@@ -108,17 +108,8 @@ pub(super) fn epochs(imager: &Imager, jacobian: &DMatrix<f64>, seen: &[f64], bef
         let mut common = DMatrix::zeros(1, numbers);
         common[before + 2 * i] = LEVEL;
         common[before + 2 * i + 1] = LEVEL * reading.place;
-        Epoch {
-            time_d: reading.time_d,
-            jacobian: jacobian.rows(k, 1).into_owned().into(),
-            misfit: DVector::from_element(1, reading.value - seen[k]),
-            variance: DVector::from_element(1, reading.sigma * reading.sigma),
-            nuisances: DMatrix::zeros(1, 0),
-            beside: 0.0,
-            slopes: DMatrix::zeros(1, 0),
-            common,
-            divisor: DVector::zeros(0),
-        }
+        let row = jacobian.rows(k, 1).into_owned();
+        Epoch::of_datum(reading.time_d, row, reading.value - seen[k], reading.sigma, common)
     };
     readings.enumerate().map(epoch).collect()
 }

@@ -90,17 +90,8 @@ impl Light {
                 let mut common = DMatrix::zeros(1, numbers);
                 common[first + 2 * bin.segment] = LEVEL;
                 common[first + 2 * bin.segment + 1] = LEVEL * bin.place;
-                epochs.push(Epoch {
-                    time_d: bin.time_d,
-                    jacobian: self.jacobian.rows(k, 1).into_owned().into(),
-                    misfit: DVector::from_element(1, bin.flux - fluxes[k]),
-                    variance: DVector::from_element(1, bin.sigma * bin.sigma),
-                    nuisances: DMatrix::zeros(1, 0),
-                    beside: 0.0,
-                    slopes: DMatrix::zeros(1, 0),
-                    common,
-                    divisor: DVector::zeros(0),
-                });
+                let row = self.jacobian.rows(k, 1).into_owned();
+                epochs.push(Epoch::of_datum(bin.time_d, row, bin.flux - fluxes[k], bin.sigma, common));
             }
             first += 2 * curve.segments;
         }
