@@ -11,8 +11,9 @@ found at a period drawn for each star. `dimcmc inject` puts it in, and another s
 goes to results/calibration/known-planets.csv; the script can be stopped, and goes on. The second command writes
 results/known-planets.md.
 
-With `--simulator stars.py --csv results/calibration/known-planets-physics.csv` stars, spots, lines and the first planet are those of a simulator that shares nothing with
-the program (`stars.py FOLDER --seed N --k KMS`); the second planet is put in by `dimcmc inject`.
+With `--simulator stars.py --csv results/calibration/known-planets-physics.csv` stars, spots, lines and the first planet
+are those of a simulator that shares nothing with the program (`stars.py FOLDER --seed N --k KMS`); the second planet is
+put in by `dimcmc inject`.
 """
 
 import json
@@ -98,7 +99,8 @@ def of_others(rng, seed, folder, run, simulator):
     second = first
     while abs(math.log(second / first)) < 0.35 or abs(math.log(second / prot)) < 0.25:
         second = drawn(rng)
-    run("init", "first/observations.txt", "--rotation-period", prot, "--inclination", inclination, "--out", "first.json")
+    known = ("--rotation-period", prot, "--inclination", inclination)
+    run("init", "first/observations.txt", *known, "--out", "first.json")
     phase, epoch_d = rng.random(), json.loads((folder / "first.json").read_text())["star"]["epoch_d"]
     orbit = ("--k-kms", K_KMS[1], "--porb-over-prot", second / prot, "--phi", phase)
     run("inject", "first.json", *orbit, "--out", "data", "--force")

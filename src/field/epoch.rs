@@ -35,8 +35,8 @@ pub struct Epoch {
 }
 
 impl Epoch {
-    /// A single datum at a time (d), beside no nuisances or slopes: the derivative of the model (1, H), data minus model,
-    /// standard error, and what it has of each number in common (1, numbers).
+    /// A single datum at a time (d), beside no nuisances or slopes: the derivative of the model (1, H), data minus
+    /// model, standard error, and what it has of each number in common (1, numbers).
     pub fn of_datum(time_d: f64, row: DMatrix<f64>, misfit: f64, sigma: f64, common: DMatrix<f64>) -> Self {
         Epoch {
             time_d,

@@ -3,7 +3,7 @@
 
 use super::dense::{inverses, scale_rows};
 use super::{Evidence, Field};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 impl Evidence {
     /// Most probable coefficients (H, epochs) at the times of the epochs.
@@ -35,10 +35,7 @@ impl Evidence {
         let mut after = DMatrix::zeros(harmonics.ncols(), times_d.len());
         for (correlations, mut after) in correlations.column_iter().zip(after.column_iter_mut()) {
             let mut known = seen.clone();
-            for (part, correlation) in self.numbers.parts.iter().zip(&correlations) {
-                let mut rows = known.rows_range_mut(part.clone());
-                rows *= *correlation;
-            }
+            self.correlate(known.columns_range_mut(..), correlations.as_slice());
             self.covariance.forward(&mut known);
             for ((after, before), known) in after.iter_mut().zip(&before).zip(known.column_iter()) {
                 // rounding may take more than there was
@@ -57,15 +54,20 @@ impl Evidence {
         scale_rows(&mut scaled, &self.sd);
         let mut known = &self.numbers.rows * &scaled;
         let correlations = self.field.kernel.between(&self.numbers.times_d, times_d);
-        for (mut known, correlations) in known.column_iter_mut().zip(correlations.column_iter()) {
-            for (part, correlation) in self.numbers.parts.iter().zip(&correlations) {
-                let mut rows = known.rows_range_mut(part.clone());
-                rows *= *correlation;
-            }
+        for (k, correlations) in correlations.column_iter().enumerate() {
+            self.correlate(known.columns_mut(k, 1), correlations.as_slice());
         }
         self.covariance.forward(&mut known);
         let before = scaled.tr_mul(&scaled).component_mul(&self.field.kernel.between(times_d, times_d));
         (mean, before - known.tr_mul(&known))
+    }
+
+    /// Multiplies the rows of each epoch by its correlation with another time.
+    fn correlate(&self, mut known: DMatrixViewMut<f64>, correlations: &[f64]) {
+        for (part, correlation) in self.numbers.parts.iter().zip(correlations) {
+            let mut rows = known.rows_range_mut(part.clone());
+            rows *= *correlation;
+        }
     }
 
     /// The variances of such numbers before the data.

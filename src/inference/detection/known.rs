@@ -147,8 +147,8 @@ impl KnownPlanets {
         self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned)
     }
 
-    /// The likelihood of the velocities of the star `here` with the orbits of all left free, beside the jitter where the
-    /// profiles say how large it is.
+    /// The likelihood of the velocities of the star `here` with the orbits of all left free, beside the jitter where
+    /// the profiles say how large it is.
     pub fn jitters(&self, here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
         match without_jitter {
             Some(without) => without.beside(&self.beside(&without.here.quadratic)),
