@@ -1,8 +1,9 @@
 //! Products and Cholesky factors of large symmetric matrices, in blocks of columns: nearly all of the work is in
 //! products of blocks, which nalgebra does with the best instructions of the processor (some 40 Gflop/s on one core;
-//! its own Cholesky factor, column by column, 1.5 to 4). One thread, and always the same order of sums.
+//! its own Cholesky factor, column by column, 1.5 to 4). Always the same order of sums, whatever the threads.
 
-use nalgebra::{DMatrix, DVector, Dyn, MatrixView};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn, MatrixView};
+use rayon::prelude::*;
 
 /// Columns of a block.
 const BLOCK: usize = 64;
@@ -24,17 +25,31 @@ pub fn product_with_transpose(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64
 }
 
 /// Lower triangle (diagonal blocks whole) of `A^T A`, for A (n, m); what is above is zero. A share of A at a time is
-/// transposed: it may have hundreds of megabytes.
+/// transposed: it may have hundreds of megabytes. Blocks of columns are made side by side.
 pub fn gram_of_columns(a: &DMatrix<f64>) -> DMatrix<f64> {
     let m = a.ncols();
     let mut product = DMatrix::zeros(m, m);
     for (row, rows) in blocks(a.nrows(), 16 * BLOCK) {
         let turned = a.rows(row, rows).transpose();
-        for (first, width) in blocks(m, 2 * BLOCK) {
-            let mut below = product.view_mut((first, first), (m - first, width));
+        let of_columns = product.as_mut_slice().par_chunks_mut((2 * BLOCK * m).max(1)).enumerate();
+        of_columns.for_each(|(k, columns)| {
+            let (first, width) = (2 * BLOCK * k, columns.len() / m);
+            let mut columns = DMatrixViewMut::from_slice(columns, m, width);
+            let mut below = columns.rows_mut(first, m - first);
             below.gemm(1.0, &turned.rows(first, m - first), &a.view((row, first), (rows, width)), 1.0);
-        }
+        });
     }
+    product
+}
+
+/// `A B`, blocks of columns made side by side.
+pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = a.nrows();
+    let mut product = DMatrix::zeros(n, b.ncols());
+    product.as_mut_slice().par_chunks_mut((BLOCK * n).max(1)).enumerate().for_each(|(k, columns)| {
+        let width = columns.len() / n;
+        DMatrixViewMut::from_slice(columns, n, width).gemm(1.0, a, &b.columns(BLOCK * k, width), 0.0);
+    });
     product
 }
 

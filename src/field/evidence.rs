@@ -78,7 +78,7 @@ impl Evidence {
         assert_eq!(around.shape(), (degrees.len(), epochs.len()), "coefficients of all epochs");
         let sd: Vec<f64> = field.spectrum.variances(degrees).into_iter().map(f64::sqrt).collect();
         let sharing = epochs.iter().filter(|epoch| epoch.common.ncols() > 0).count();
-        let compressed = epochs.iter().enumerate().map(|(k, epoch)| {
+        let compressed = epochs.par_iter().enumerate().map(|(k, epoch)| {
             epoch.check_shapes(degrees.len());
             let sound = epoch.is_sound() && around.column(k).iter().all(|c| c.is_finite());
             sound
@@ -86,7 +86,10 @@ impl Evidence {
                 .flatten()
                 .ok_or(FieldError::NotFinite { epoch: k })
         });
-        let (mut compressed, rows): (Vec<_>, Vec<_>) = compressed.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        // the first error, whoever finds one
+        let compressed: Vec<Result<_, FieldError>> = compressed.collect();
+        let (mut compressed, rows): (Vec<_>, Vec<_>) =
+            compressed.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let (rows, common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
         let mut numbers = Numbers::new(times_d, &rows, &common, sd.len());

@@ -198,7 +198,7 @@ impl Filter {
             Some(found) => found,
             None => {
                 let directions = seen_directions(rows)?;
-                let seen = rows * &directions;
+                let seen = dense::product(rows, &directions);
                 (directions, seen)
             }
         };
@@ -290,7 +290,7 @@ fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f
         factor.forward_from(&mut directions, &vec![0; near.nrows()]);
     }
     let directions = directions.transpose();
-    let seen = rows * &directions;
+    let seen = dense::product(rows, &directions);
     (rows.norm_squared() - seen.norm_squared() <= LEFT_OUT).then_some((directions, seen))
 }
 

@@ -20,7 +20,7 @@ const FAR_BELOW: f64 = 5.0;
 const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 const USUAL_JITTER_KMS: f64 = 0.1;
 
-/// A fit of so many profiles starts from that of a share of them, at most half as many.
+/// So many profiles have the field of a share of them, at most half as many.
 const MANY: usize = 160;
 
 /// The most probable field.
@@ -89,8 +89,7 @@ pub(in crate::surface) fn usual(
 }
 
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
-/// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
-/// has a break included.
+/// has it begin, or else from several lifetimes; to many profiles the field that a share of them says.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -105,19 +104,16 @@ pub fn fit(
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
+    if let Some(share) = share_of_many(imager).filter(|_| known.is_open()) {
+        return by_a_share((imager, &share), basis, values, known, near, &at);
+    }
     // the field that a fit begins from has or has no break
     let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
     let is_near = near.is_some() || begin.is_some();
-    let share = (!is_near).then(|| by_a_share(imager, basis, values, known)).flatten();
-    let (first, hessian) = match (near, begin, share) {
-        (Some(Fitted { marginal, hessian, .. }), ..) => {
-            // maps of another orbit may be too far away
-            let first = at(marginal.assumed, Some(marginal)).or_else(|_| at(marginal.assumed, None));
-            (first?, *hessian)
-        }
-        (None, Some(begin), _) => (begin, None),
-        (None, None, Some((assumed, hessian))) => (at(assumed, None)?, hessian),
-        (None, None, None) => {
+    let (first, hessian) = match (near, begin) {
+        (Some(Fitted { marginal, hessian, .. }), _) => (anew(marginal.assumed, marginal, &at)?, *hessian),
+        (None, Some(begin)) => (begin, None),
+        (None, None) => {
             let rough = Arc::new(basis.roughly());
             // of many profiles each is hundreds of megabytes: only the best so far is kept
             let higher = |best, next| higher(best, next, &known);
@@ -136,7 +132,7 @@ pub fn fit(
         }
     };
     let mut top = climb(first, &known, hessian, &at)?;
-    if !is_near && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
+    if !is_near && known.break_degree.is_none() && known.slope.is_none() {
         top = with_or_without_break(top, &known, &at)?;
     }
     if known.jitter_kms.is_none() {
@@ -151,17 +147,43 @@ pub fn fit(
     Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) })
 }
 
-/// The field of a share of the profiles: nearly that of all of them, at a small part of the work; with its Hessian.
-/// `None` where there are few, the share does not tell it, or nothing is left to tell.
+/// The profiles with the field of a share of them, or of a fit `near` by where the share does not tell it: a climb with
+/// many profiles takes minutes, and those that follow each other closely say the same of the field.
 fn by_a_share(
-    imager: &Imager,
+    (imager, share): (&Imager, &Imager),
     basis: &Arc<Basis>,
     values: ParameterValues,
     known: Known,
-) -> Option<(Assumed, Option<Matrix4<f64>>)> {
-    let share = share_of_many(imager).filter(|_| known.is_open())?;
-    let Fitted { marginal, hessian, .. } = fit(&share, basis, values, known, None).ok()?;
-    Some((marginal.assumed, hessian))
+    near: Option<&Fitted>,
+    at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
+) -> Result<Fitted, NoFit> {
+    let start = near.map(|near| near.marginal.assumed.into()).or(known.start);
+    let of_share = fit(share, basis, values, Known { start, ..known }, None);
+    let (assumed, hessian, at_bounds) = match (of_share, near) {
+        (Ok(of), _) => (of.marginal.assumed, of.hessian, of.at_bounds),
+        (Err(_), Some(near)) => (near.marginal.assumed, near.hessian, Vec::new()),
+        (Err(none), None) => return Err(none),
+    };
+    let more = imager.profiles().count() as f64 / share.profiles().count() as f64;
+    let marginal = match near {
+        Some(near) => anew(assumed, &near.marginal, at)?,
+        None => at(assumed, None)?,
+    };
+    match marginal.ln_evidence() {
+        ln_evidence if ln_evidence.is_finite() => {
+            Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: hessian.map(|hessian| hessian * more) })
+        }
+        _ => Err(NoFit::NotFinite),
+    }
+}
+
+/// The profiles with a field from maps near by, or from uniform ones: maps of another orbit may be too far away.
+fn anew(
+    assumed: Assumed,
+    near: &Marginal,
+    at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
+) -> Result<Marginal, FieldError> {
+    at(assumed, Some(near)).or_else(|_| at(assumed, None))
 }
 
 /// A share of the profiles where there are [`MANY`]: at most half as many as that.
