@@ -18,6 +18,9 @@ const RARE: f64 = 0.01;
 /// Neighbouring bins, and core against wings, are worth one beyond that many standard deviations.
 const FAR: f64 = 5.0;
 
+/// Profiles that are named one by one at most.
+const NAMED: usize = 5;
+
 /// What is left over in one bin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Residual {
@@ -122,16 +125,7 @@ impl Checks {
     fn doubts(&self, neighbours_go_together: bool, flexible: bool) -> Vec<String> {
         let size = |x: f64| if flexible { x } else { x.abs() };
         let mut doubts = Vec::new();
-        let rare = RARE / self.profiles.len() as f64;
-        for (k, profile) in self.profiles.iter().enumerate().filter(|(_, profile)| profile.p_value < rare) {
-            doubts.push(format!(
-                "profile {} ({:.4} d) fits worse than the others: chi2 {:.2} per datum, by chance once in {:.0e}",
-                k + 1,
-                profile.time_d,
-                profile.chi2 / profile.data as f64,
-                1.0 / profile.p_value.max(1e-300)
-            ));
-        }
+        doubts.extend(self.of_profiles());
         if size(self.core_excess_sigma) > FAR {
             doubts.push(format!(
                 "chi2 is {:.2} per datum in the core of the line and {:.2} outside: errors, local line or continuum \
@@ -148,6 +142,30 @@ impl Checks {
             ));
         }
         doubts
+    }
+}
+
+impl Checks {
+    /// Profiles that fit worse than the others: each, or of more than [`NAMED`] how many and the worst.
+    fn of_profiles(&self) -> Vec<String> {
+        let rare = RARE / self.profiles.len() as f64;
+        let numbered = self.profiles.iter().enumerate();
+        let mut worse: Vec<(usize, &ProfileCheck)> = numbered.filter(|(_, profile)| profile.p_value < rare).collect();
+        let of = |(k, profile): &(usize, &ProfileCheck)| {
+            let (chi2, chance) = (profile.chi2 / profile.data as f64, 1.0 / profile.p_value.max(1e-300));
+            let profile = format!("profile {} ({:.4} d)", k + 1, profile.time_d);
+            (profile, format!("chi2 {chi2:.2} per datum, by chance once in {chance:.0e}"))
+        };
+        if worse.len() <= NAMED {
+            let one = |(profile, size): (String, String)| format!("{profile} fits worse than the others: {size}");
+            return worse.iter().map(of).map(one).collect();
+        }
+        let many = worse.len();
+        worse.sort_by(|(_, a), (_, b)| a.p_value.total_cmp(&b.p_value));
+        let (profile, size) = of(&worse[0]);
+        vec![format!(
+            "{many} profiles fit worse than the others (checks.profiles in fit.json), {profile} worst: {size}"
+        )]
     }
 }
 
@@ -239,7 +257,9 @@ mod tests {
     fn sets_are_held_against_themselves() {
         let errors = |k: usize, _: usize, noise: f64| if k < 30 { 0.6 * noise } else { noise };
         let pooled = noise(errors);
-        assert!(pooled.warnings.len() > 1, "{:?}", pooled.warnings);
+        // many are one warning
+        let [many] = &pooled.warnings[..] else { panic!("{:?}", pooled.warnings) };
+        assert!(many.contains(" profiles fit worse than the others") && many.contains(" worst: chi2 1."), "{many}");
         let apart = noise_of(&[0..30, 30..40], errors);
         assert!(apart.warnings.is_empty(), "{:?}", apart.warnings);
     }

@@ -385,11 +385,16 @@ impl Imager {
         self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
     }
 
-    /// Number of times at which the star is seen: profiles, bins of light curves, and readings of indicators.
+    /// Number of times at which the star is seen.
     pub fn epochs(&self) -> usize {
-        let bins = self.light_curves.iter().map(|curve| curve.bins.len()).sum::<usize>();
-        let readings = self.indicators.iter().map(|indicator| indicator.readings.len()).sum::<usize>();
-        self.profiles().count() + bins + readings
+        self.times_of_epochs().count()
+    }
+
+    /// Times (d) at which the star is seen: of profiles, bins of light curves, and readings of indicators.
+    pub fn times_of_epochs(&self) -> impl Iterator<Item = f64> {
+        let bins = self.light_curves.iter().flat_map(|curve| &curve.bins).map(|bin| bin.time_d);
+        let readings = self.indicators.iter().flat_map(|indicator| &indicator.readings).map(|reading| reading.time_d);
+        self.profiles().map(|profile| profile.0).chain(bins).chain(readings)
     }
 
     /// Times of all profiles (d).

@@ -12,6 +12,9 @@ pub use crate::surface::evolving_map::events::{ByHand, Event};
 /// More than this share of the profiles are not events: the model is wrong, or the errors are.
 const MOST: f64 = 1.0 / 3.0;
 
+/// Events that are named one by one at most.
+const NAMED: usize = 5;
+
 /// The events among some profiles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Events {
@@ -65,15 +68,25 @@ impl Events {
         })
     }
 
-    /// It in words; `None` where there is none.
+    /// It in words, the largest of many; `None` where there is none.
     pub fn line(&self) -> Option<String> {
-        let of = |event: &Event| {
+        let of = |event: &&Event| {
             let Event { profile, time_d, sigma_factor, .. } = event;
             format!("{profile} ({time_d:.4} d, uncertainties × {sigma_factor:.1})")
         };
-        let all: Vec<String> = self.profiles.iter().map(of).collect();
-        let plural = if all.len() == 1 { "" } else { "s" };
-        self.too_many().or((!all.is_empty()).then(|| format!("outlier profile{plural} {}", all.join(", "))))
+        let mut named: Vec<&Event> = self.profiles.iter().collect();
+        if named.len() > NAMED {
+            named.sort_by(|a, b| b.sigma_factor.total_cmp(&a.sigma_factor));
+            named.truncate(NAMED);
+            named.sort_by_key(|event| event.profile);
+        }
+        let all = named.iter().map(of).collect::<Vec<_>>().join(", ");
+        let line = || match self.profiles.len() {
+            1 => format!("outlier profile {all}"),
+            many if many > NAMED => format!("{many} outlier profiles, the largest {all}"),
+            _ => format!("outlier profiles {all}"),
+        };
+        self.too_many().or((!self.profiles.is_empty()).then(line))
     }
 }
 
@@ -96,5 +109,9 @@ mod tests {
         assert_eq!(Events::among((1..=5).map(event).collect(), &by_hand).profiles.len(), 5);
         let one = Events::among(vec![event(3)], &by_hand).line().unwrap();
         assert_eq!(one, "outlier profile 3 (0.1000 d, uncertainties × 2.5)");
+        let larger = |k: usize| Event { sigma_factor: k as f64, ..event(k) };
+        let seven = Events::among((1..=7).map(larger).collect(), &[ByHand::Event; 24]).line().unwrap();
+        assert!(seven.starts_with("7 outlier profiles, the largest 3 (0.1000 d"), "{seven}");
+        assert!(seven.ends_with(", 7 (0.1000 d, uncertainties × 7.0)"), "{seven}");
     }
 }

@@ -100,19 +100,30 @@ pub fn fit(
     known: Known,
     near: Option<&Fitted>,
 ) -> Result<Fitted, NoFit> {
+    bent(imager, basis, values, known, (near, None))
+}
+
+/// The same; where it begins from what is `known`, with second derivatives like these.
+fn bent(
+    imager: &Imager,
+    basis: &Arc<Basis>,
+    values: ParameterValues,
+    known: Known,
+    (near, bend): (Option<&Fitted>, Option<Matrix4<f64>>),
+) -> Result<Fitted, NoFit> {
     let design = Arc::new(Design::new(imager, basis, &values.state()));
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
     if let Some(share) = share_of_many(imager).filter(|_| known.is_open()) {
-        return by_a_share((imager, &share), basis, values, known, near, &at);
+        return by_a_share((imager, &share), (basis, &design), values, known, near, &at);
     }
     // the field that a fit begins from has or has no break
     let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
     let is_near = near.is_some() || begin.is_some();
     let (first, hessian) = match (near, begin) {
         (Some(Fitted { marginal, hessian, .. }), _) => (anew(marginal.assumed, marginal, &at)?, *hessian),
-        (None, Some(begin)) => (begin, None),
+        (None, Some(begin)) => (begin, bend),
         (None, None) => {
             let rough = Arc::new(basis.roughly());
             // of many profiles each is hundreds of megabytes: only the best so far is kept
@@ -151,23 +162,24 @@ pub fn fit(
 /// many profiles takes minutes, and those that follow each other closely say the same of the field.
 fn by_a_share(
     (imager, share): (&Imager, &Imager),
-    basis: &Arc<Basis>,
+    (basis, design): (&Arc<Basis>, &Arc<Design>),
     values: ParameterValues,
     known: Known,
     near: Option<&Fitted>,
     at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
 ) -> Result<Fitted, NoFit> {
-    let start = near.map(|near| near.marginal.assumed.into()).or(known.start);
-    let of_share = fit(share, basis, values, Known { start, ..known }, None);
-    let (assumed, hessian, at_bounds) = match (of_share, near) {
-        (Ok(of), _) => (of.marginal.assumed, of.hessian, of.at_bounds),
-        (Err(_), Some(near)) => (near.marginal.assumed, near.hessian, Vec::new()),
-        (Err(none), None) => return Err(none),
-    };
     let more = imager.profiles().count() as f64 / share.profiles().count() as f64;
-    let marginal = match near {
-        Some(near) => anew(assumed, &near.marginal, at)?,
-        None => at(assumed, None)?,
+    let start = near.map(|near| near.marginal.assumed.into()).or(known.start);
+    let bend = near.and_then(|near| near.hessian).map(|hessian| hessian / more);
+    let of_share = bent(share, basis, values, Known { start, ..known }, (None, bend));
+    let (marginal, hessian, at_bounds) = match (of_share, near) {
+        (Ok(of), Some(near)) => (anew(of.marginal.assumed, &near.marginal, at)?, of.hessian, of.at_bounds),
+        (Ok(Fitted { marginal: of, hessian, at_bounds, .. }), None) => {
+            let begun = Marginal::of_share(imager, basis, Arc::clone(design), values, &of);
+            (begun.or_else(|_| at(of.assumed, None))?, hessian, at_bounds)
+        }
+        (Err(_), Some(near)) => (anew(near.marginal.assumed, &near.marginal, at)?, near.hessian, Vec::new()),
+        (Err(none), None) => return Err(none),
     };
     match marginal.ln_evidence() {
         ln_evidence if ln_evidence.is_finite() => {
@@ -188,7 +200,12 @@ fn anew(
 
 /// A share of the profiles where there are [`MANY`]: at most half as many as that.
 pub(super) fn share_of_many(imager: &Imager) -> Option<Imager> {
-    if imager.profiles().count() >= MANY { share_of(imager, MANY / 2) } else { None }
+    is_many(imager).then(|| share_of(imager, MANY / 2)).flatten()
+}
+
+/// Whether there are so many profiles that a share tells their field.
+pub(super) fn is_many(imager: &Imager) -> bool {
+    imager.profiles().count() >= MANY
 }
 
 /// Every n-th profile, so that there are so many at most; `None` where there are no more.

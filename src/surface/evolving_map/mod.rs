@@ -145,28 +145,41 @@ impl Marginal {
         assumed: Assumed,
         nearby: Option<&Marginal>,
     ) -> Result<Self, FieldError> {
-        let nearby = nearby.map(|nearby| (nearby, nearby.settled.coefficients.clone()));
-        Marginal::begun((imager, basis), design, values, assumed, nearby)
+        let start = match nearby {
+            Some(nearby) => nearby.settled.coefficients.clone(),
+            None => DMatrix::zeros(basis.len(), imager.epochs()),
+        };
+        Marginal::begun((imager, basis), design, values, assumed, (nearby, start))
     }
 
-    /// The same by a star and field nearby, maps being found from these coefficients (H, epochs).
+    /// The same with the field of a `share` of the profiles, maps being found from those of the share.
+    fn of_share(
+        imager: &Imager,
+        basis: &Arc<Basis>,
+        design: Arc<Design>,
+        values: ParameterValues,
+        share: &Marginal,
+    ) -> Result<Self, FieldError> {
+        let times_d: Vec<f64> = imager.times_of_epochs().collect();
+        let start = share.settled.evidence.coefficients_at(&times_d);
+        Marginal::begun((imager, basis), design, values, share.assumed, (None, start))
+    }
+
+    /// The same by a star and field nearby, if there are any, maps being found from these coefficients (H, epochs).
     fn begun(
         (imager, basis): (&Imager, &Arc<Basis>),
         design: Arc<Design>,
         values: ParameterValues,
         assumed: Assumed,
-        nearby: Option<(&Marginal, DMatrix<f64>)>,
+        (nearby, start): (Option<&Marginal>, DMatrix<f64>),
     ) -> Result<Self, FieldError> {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let values = assumed.among(values);
-        let (by, start) = match nearby {
-            Some((nearby, start)) if assumed.jitter_kms > 0.0 => {
-                let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
-                return Marginal::with_jitter((imager, basis), design, values, assumed, (nearby, start, times));
-            }
-            Some((nearby, start)) => (Some(&nearby.settled.evidence), start),
-            None => (None, DMatrix::zeros(basis.len(), imager.epochs())),
-        };
+        if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
+            let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
+            return Marginal::with_jitter((imager, basis), design, values, assumed, (nearby, start, times));
+        }
+        let by = nearby.map(|nearby| &nearby.settled.evidence);
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let settled = settle(linearise, sought, start, by, &basis.settling)?;
         let marginal = Marginal::settled_at((basis, design), values, assumed, settled);

@@ -139,7 +139,7 @@ impl MarginalPosterior {
         for (i, along) in self.along.iter() {
             maps += along * off[*i].clamp(-FAR, FAR);
         }
-        Marginal::begun((imager, basis), design, values, assumed, Some((reference, maps)))
+        Marginal::begun((imager, basis), design, values, assumed, (Some(reference), maps))
     }
 
     /// `values` with the orbit and systemic velocity of the reference.
