@@ -29,6 +29,8 @@ CONFIG = {
         "vsini_kms": 20.0,
         "contrast": 0.1,
         "line": {"sigma_kms": 2.5, "equivalent_width_kms": 5.8},
+        # nothing is fitted that takes long
+        "regions": {"area": 0.0},
     },
     "observations": [
         {
@@ -45,7 +47,7 @@ CONFIG = {
         }
         for name, seed in (("a", 1), ("b", 2))
     ],
-    "imaging": {"pixels": 200},
+    "imaging": {"pixels": 200, "spot_amplitude": 0.3, "spot_slope": 1.0, "spot_lifetime_d": 15.0},
     "planet": {"k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.2},
     "parameters": {
         "k_kms": {"prior": "uniform", "min": 0.0, "max": 2.0},
@@ -124,7 +126,8 @@ class Bench:
         write("one.json", one)
         write("two.json", one | {"sampler": CONFIG["sampler"] | {"seed": 2}})
         (self.inputs / "list.txt").write_text("one.json\ntwo.json\n")
-        static = one | {"imaging": {"pixels": 200, "objective": "spottedness", "chi2_target": 1.05}, "grid": GRID}
+        star = {key: value for key, value in CONFIG["star"].items() if key != "regions"}
+        static = one | {"star": star, "imaging": {"pixels": 200, "objective": "spottedness", "chi2_target": 1.05}, "grid": GRID}
         write("grid.json", static)
         steps = [
             "simulate star.json --out data",
