@@ -152,7 +152,8 @@ def ratios(rows, others):
 
 def groups(rows):
     apart = list({row["seed"]: row for row in reversed(rows)}.values())
-    return [("all", rows), ("one per seed", apart), *((effect, [row for row in rows if row["effect"] == effect]) for effect in EFFECTS)]
+    of_each = ((effect, [row for row in rows if row["effect"] == effect]) for effect in EFFECTS)
+    return [("all", rows), ("one per seed", apart), *of_each]
 
 
 def false_alarms(rows):

@@ -127,7 +127,8 @@ class Bench:
         write("two.json", one | {"sampler": CONFIG["sampler"] | {"seed": 2}})
         (self.inputs / "list.txt").write_text("one.json\ntwo.json\n")
         star = {key: value for key, value in CONFIG["star"].items() if key != "regions"}
-        static = one | {"star": star, "imaging": {"pixels": 200, "objective": "spottedness", "chi2_target": 1.05}, "grid": GRID}
+        imaging = {"pixels": 200, "objective": "spottedness", "chi2_target": 1.05}
+        static = one | {"star": star, "imaging": imaging, "grid": GRID}
         write("grid.json", static)
         steps = [
             "simulate star.json --out data",

@@ -20,8 +20,12 @@ const FAR_BELOW: f64 = 5.0;
 const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 const USUAL_JITTER_KMS: f64 = 0.1;
 
-/// So many profiles have the field of a share of them, at most half as many.
+/// A fit of so many profiles starts from that of a share of them, at most half as many.
 const MANY: usize = 160;
+
+/// Beyond so many profiles times squared harmonics a climb of 20 to 40 evaluations takes minutes: 411 profiles of a star
+/// of 30 km/s (some 800 harmonics) are 2.6e8, 226 of one of 90 km/s (1,344) 4.1e8.
+const LONG: f64 = 3e8;
 
 /// The most probable field.
 #[derive(Clone, Debug)]
@@ -89,7 +93,8 @@ pub(in crate::surface) fn usual(
 }
 
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
-/// has it begin, or else from several lifetimes; to many profiles the field that a share of them says.
+/// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
+/// has a break included. Where a climb with all of them takes minutes the field is that of the share.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -115,16 +120,21 @@ fn bent(
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
-    if let Some(share) = share_of_many(imager).filter(|_| known.is_open()) {
-        return by_a_share((imager, &share), (basis, &design), values, known, near, &at);
+    let share = share_of_many(imager).filter(|_| known.is_open());
+    if let Some(share) = share.as_ref().filter(|_| takes_minutes(imager, basis)) {
+        return by_a_share((imager, share), (basis, &design), values, known, near, &at);
     }
     // the field that a fit begins from has or has no break
     let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
     let is_near = near.is_some() || begin.is_some();
-    let (first, hessian) = match (near, begin) {
-        (Some(Fitted { marginal, hessian, .. }), _) => (anew(marginal.assumed, marginal, &at)?, *hessian),
-        (None, Some(begin)) => (begin, bend),
-        (None, None) => {
+    let share = share.filter(|_| !is_near).and_then(|share| fit(&share, basis, values, known, None).ok());
+    let (first, hessian) = match (near, begin, &share) {
+        (Some(Fitted { marginal, hessian, .. }), ..) => (anew(marginal.assumed, marginal, &at)?, *hessian),
+        (None, Some(begin), _) => (begin, bend),
+        (None, None, Some(Fitted { marginal: share, hessian, .. })) => {
+            (of_share(share, (imager, basis, &design), values, &at)?, *hessian)
+        }
+        (None, None, None) => {
             let rough = Arc::new(basis.roughly());
             // of many profiles each is hundreds of megabytes: only the best so far is kept
             let higher = |best, next| higher(best, next, &known);
@@ -143,7 +153,7 @@ fn bent(
         }
     };
     let mut top = climb(first, &known, hessian, &at)?;
-    if !is_near && known.break_degree.is_none() && known.slope.is_none() {
+    if !is_near && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
         top = with_or_without_break(top, &known, &at)?;
     }
     if known.jitter_kms.is_none() {
@@ -158,8 +168,13 @@ fn bent(
     Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) })
 }
 
-/// The profiles with the field of a share of them, or of a fit `near` by where the share does not tell it: a climb with
-/// many profiles takes minutes, and those that follow each other closely say the same of the field.
+/// Whether a climb does.
+fn takes_minutes(imager: &Imager, basis: &Basis) -> bool {
+    imager.profiles().count() as f64 * (basis.len() as f64).powi(2) > LONG
+}
+
+/// The profiles with the field of a share of them, or of a fit `near` by where the share does not tell it: those that
+/// follow each other closely say nearly the same of the field.
 fn by_a_share(
     (imager, share): (&Imager, &Imager),
     (basis, design): (&Arc<Basis>, &Arc<Design>),
@@ -171,12 +186,11 @@ fn by_a_share(
     let more = imager.profiles().count() as f64 / share.profiles().count() as f64;
     let start = near.map(|near| near.marginal.assumed.into()).or(known.start);
     let bend = near.and_then(|near| near.hessian).map(|hessian| hessian / more);
-    let of_share = bent(share, basis, values, Known { start, ..known }, (None, bend));
-    let (marginal, hessian, at_bounds) = match (of_share, near) {
+    let found = bent(share, basis, values, Known { start, ..known }, (None, bend));
+    let (marginal, hessian, at_bounds) = match (found, near) {
         (Ok(of), Some(near)) => (anew(of.marginal.assumed, &near.marginal, at)?, of.hessian, of.at_bounds),
         (Ok(Fitted { marginal: of, hessian, at_bounds, .. }), None) => {
-            let begun = Marginal::of_share(imager, basis, Arc::clone(design), values, &of);
-            (begun.or_else(|_| at(of.assumed, None))?, hessian, at_bounds)
+            (of_share(&of, (imager, basis, design), values, at)?, hessian, at_bounds)
         }
         (Err(_), Some(near)) => (anew(near.marginal.assumed, &near.marginal, at)?, near.hessian, Vec::new()),
         (Err(none), None) => return Err(none),
@@ -187,6 +201,17 @@ fn by_a_share(
         }
         _ => Err(NoFit::NotFinite),
     }
+}
+
+/// All profiles with the field of a share of them.
+fn of_share(
+    share: &Marginal,
+    (imager, basis, design): (&Imager, &Arc<Basis>, &Arc<Design>),
+    values: ParameterValues,
+    at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
+) -> Result<Marginal, FieldError> {
+    let begun = Marginal::of_share(imager, basis, Arc::clone(design), values, share);
+    begun.or_else(|_| at(share.assumed, None))
 }
 
 /// The profiles with a field from maps near by, or from uniform ones: maps of another orbit may be too far away.
