@@ -8,6 +8,9 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 /// Pixels at which changes of the maps are watched, about.
 const WATCHED: usize = 150;
 
+/// How exactly maps are found where differences of ln Z need be good to a few tenths only.
+const ROUGH: f64 = 5e-3;
+
 /// The harmonics on the pixels of a map.
 #[derive(Clone, Debug)]
 pub struct Basis {
@@ -64,7 +67,12 @@ impl Basis {
     #[must_use]
     pub(super) fn roughly(&self) -> Self {
         let compression = Compression { left_out: 0.03 };
-        Basis { settling: Settling { tolerance: 5e-3, compression, ..Settling::default() }, ..self.clone() }
+        Basis { settling: Settling { tolerance: ROUGH, compression, ..Settling::default() }, ..self.clone() }
+    }
+
+    /// Whether they are so.
+    pub(super) fn is_rough(&self) -> bool {
+        self.settling.tolerance >= ROUGH
     }
 
     /// Number H of harmonics.

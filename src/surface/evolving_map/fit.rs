@@ -94,7 +94,7 @@ pub(in crate::surface) fn usual(
 
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
 /// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
-/// has a break included. Where a climb with all of them takes minutes the field is that of the share.
+/// has a break included. Where a climb with all of them takes minutes, or maps are rough, the field is that of the share.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -121,7 +121,7 @@ fn bent(
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
     let share = share_of_many(imager).filter(|_| known.is_open());
-    if let Some(share) = share.as_ref().filter(|_| takes_minutes(imager, basis)) {
+    if let Some(share) = share.as_ref().filter(|_| is_said_by_a_share(imager, basis)) {
         return by_a_share((imager, share), (basis, &design), values, known, near, &at);
     }
     // the field that a fit begins from has or has no break
@@ -168,9 +168,9 @@ fn bent(
     Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) })
 }
 
-/// Whether a climb does.
-fn takes_minutes(imager: &Imager, basis: &Basis) -> bool {
-    imager.profiles().count() as f64 * (basis.len() as f64).powi(2) > LONG
+/// Whether the field is that of a share: where a climb takes minutes, and where ln Z is good to a few tenths only.
+fn is_said_by_a_share(imager: &Imager, basis: &Basis) -> bool {
+    basis.is_rough() || imager.profiles().count() as f64 * (basis.len() as f64).powi(2) > LONG
 }
 
 /// The profiles with the field of a share of them, or of a fit `near` by where the share does not tell it: those that
