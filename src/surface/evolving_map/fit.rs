@@ -23,8 +23,8 @@ const USUAL_JITTER_KMS: f64 = 0.1;
 /// A fit of so many profiles starts from that of a share of them, at most half as many.
 const MANY: usize = 160;
 
-/// Beyond so many profiles times squared harmonics a climb of 20 to 40 evaluations takes minutes: 411 profiles of a star
-/// of 30 km/s (some 800 harmonics) are 2.6e8, 226 of one of 90 km/s (1,344) 4.1e8.
+/// Beyond so many profiles times squared harmonics a climb of 20 to 40 evaluations takes minutes: 411 profiles of a
+/// star of 30 km/s (some 800 harmonics) are 2.6e8, 226 of one of 90 km/s (1,344) 4.1e8.
 const LONG: f64 = 3e8;
 
 /// The most probable field.
@@ -94,7 +94,8 @@ pub(in crate::surface) fn usual(
 
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
 /// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
-/// has a break included. Where a climb with all of them takes minutes, or maps are rough, the field is that of the share.
+/// has a break included. Where a climb with all of them takes minutes, or maps are rough, the field is that of the
+/// share.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
