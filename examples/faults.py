@@ -1,17 +1,18 @@
-"""Kills at random moments, full disks and read-only folders: is anything lost? (results/reliability.md)
+"""Kills at random moments, and full disks: is anything lost? (results/reliability.md)
 
-    python3 examples/kill_check.py --program target/release/dimcmc --kills 200
-    python3 examples/kill_check.py --table
+    python3 examples/faults.py --program target/release/dimcmc --kills 200 --full 200
+    python3 examples/faults.py --table
 
 Every command that writes is run on a small star with two data sets, once to its end. Then it is started again in a
 fresh copy of what it reads, killed (SIGKILL) after a random share of that time, and run once more as a user would: with
-`--resume` where the command has it and its folder holds a run, otherwise as before. Afterwards the folder must hold the
-same bytes as that of the run that was not killed, but for times, and nothing else, no temporary file either. The second
-command writes the tables. Linux; needs nothing but Python.
+`--resume` where the command has it and its folder holds a run, with `--force` where the message asks for it as the
+folder holds some of the files, otherwise as before. Afterwards the folder must hold the same bytes as that of the run
+that was not killed, but for times, and nothing else, no temporary file either. Disks are full after a random share of
+what a command writes, and have room again when it is run once more. The second command prints the table. Linux; needs
+numpy, and full disks need root.
 """
 
 import argparse
-import csv
 import json
 import os
 import random
@@ -20,6 +21,8 @@ import signal
 import subprocess
 import time
 from pathlib import Path
+
+import calibration_table
 
 CONFIG = {
     "star": {
@@ -78,9 +81,10 @@ COMMANDS = {
     "export": ("export runs/1 --format csv --out out/chain.csv", False),
     "report": ("report runs/1 --out out/page.html", False),
     "plot": ("plot runs/1 --out out", False),
-    "survey": ("survey survey/one survey/two --out out", False),
+    "survey": ("survey survey/one survey/other --out out", False),
 }
-COLUMNS = ("command", "killed_at", "of_seconds", "second", "same", "problem")
+FAULTS = ("kill", "full disk")
+COLUMNS = ("command", "fault", "at", "of_seconds", "second", "same", "problem")
 TIMES = ("seconds", "started", "finished", "elapsed", "wall")
 
 
@@ -125,6 +129,9 @@ class Bench:
         one = CONFIG | {"observations": CONFIG["observations"][0]}
         write("one.json", one)
         write("two.json", one | {"sampler": CONFIG["sampler"] | {"seed": 2}})
+        data = CONFIG["observations"][0]
+        other = data | {"simulate": data["simulate"] | {"seed": 5}}
+        write("other.json", one | {"observations": other})
         (self.inputs / "list.txt").write_text("one.json\ntwo.json\n")
         star = {key: value for key, value in CONFIG["star"].items() if key != "regions"}
         imaging = {"pixels": 200, "objective": "spottedness", "chi2_target": 1.05}
@@ -135,7 +142,7 @@ class Bench:
             "sample one.json --out runs/1",
             "sample two.json --out runs/2",
         ]
-        for name in ("one", "two"):
+        for name in ("one", "other"):
             steps.append(f"periodogram {name}.json --draws 1000 --out survey/{name}/search")
             limits = "--draws 1000 --periods 6 --amplitudes 6 --phases 4"
             steps.append(f"limits {name}.json {limits} --out survey/{name}/limits")
@@ -163,7 +170,7 @@ class Bench:
         return time.monotonic() - began, files(folder / "out")
 
     def killed(self, name, seconds, reference, share):
-        words, resumes = COMMANDS[name]
+        words, _ = COMMANDS[name]
         folder = self.fresh("killed")
         process = subprocess.Popen(
             [self.program, *words.split()],
@@ -174,51 +181,63 @@ class Bench:
         )
         time.sleep(share * seconds)
         process.send_signal(signal.SIGKILL)
-        ended = process.wait()
-        line = {"command": name, "killed_at": f"{share:.3f}", "of_seconds": f"{seconds:.2f}"}
-        left = any((folder / "out").iterdir())
-        again = words.split()
-        if ended != -signal.SIGKILL:
+        line = {"command": name, "fault": "kill", "at": f"{share:.3f}", "of_seconds": f"{seconds:.2f}"}
+        if process.wait() != -signal.SIGKILL:
             line["second"] = "had ended"
-        elif resumes and left:
-            again.append("--resume")
-            line["second"] = "resume"
-            if self.run(again, folder).returncode != 0:
-                # nothing had begun that could go on
-                line["second"] = "resume refused, again"
-                again.pop()
-                done = self.run(again, folder)
-                if done.returncode != 0:
-                    return line | {"same": 0, "problem": done.stderr.strip().splitlines()[-1]}
-        else:
-            line["second"] = "again"
-            done = self.run(again, folder)
+        return line | self.once_more(name, folder, reference, line.get("second"))
+
+    def full(self, name, seconds, reference, share):
+        """The disk is full after a share of what is written, and has room again afterwards."""
+        words, _ = COMMANDS[name]
+        folder = self.fresh("full")
+        pages = int(share * sum(len(data) // 4096 + 1 for data in reference.values()))
+        room = lambda size, more="": ["mount", "-t", "tmpfs", "-o", f"{more}size={size}", "tmpfs", folder / "out"]
+        subprocess.run(room(max(pages, 1) * 4096), check=True)
+        try:
+            done = self.run(words.split(), folder)
+            line = {"command": name, "fault": "full disk", "at": f"{share:.3f}", "of_seconds": f"{seconds:.2f}"}
+            if done.returncode == 0:
+                line["second"] = "had ended"
+            elif "No space left" not in done.stderr:
+                return line | {"same": 0, "problem": f"exit {done.returncode}: {done.stderr.strip()[-200:]}"}
+            subprocess.run(room("64m", "remount,"), check=True)
+            return line | self.once_more(name, folder, reference, line.get("second"))
+        finally:
+            subprocess.run(["umount", folder / "out"], check=True)
+
+    def once_more(self, name, folder, reference, second):
+        """How a command that was cut short is run again, if it was, and whether all is as without it."""
+        words, resumes = COMMANDS[name]
+        again = words.split()
+        if second is None:
+            ways = [("again", again), ("again by --force", [*again, "--force"])]
+            if resumes and any((folder / "out").iterdir()):
+                ways.insert(0, ("resume", [*again, "--resume"]))
+            for second, way in ways:
+                done = self.run(way, folder)
+                # some files were written, and the message says what to do; or nothing had begun that could go on
+                if done.returncode == 0 or "--force" not in done.stderr and second != "resume":
+                    break
             if done.returncode != 0:
-                return line | {"same": 0, "problem": done.stderr.strip().splitlines()[-1]}
+                return {"second": second, "same": 0, "problem": done.stderr.strip().splitlines()[-1]}
         found = files(folder / "out")
         differ = sorted(key for key in found.keys() | reference.keys() if found.get(key) != reference.get(key))
-        return line | {"same": int(not differ), "problem": " ".join(differ)}
-
-
-def read(path):
-    if not path.exists():
-        return []
-    with open(path, newline="") as file:
-        return list(csv.DictReader(file))
+        return {"second": second, "same": int(not differ), "problem": " ".join(differ)}
 
 
 def table(rows):
-    lines = ["| command | seconds | kills | resumed | same bytes afterwards |", "|---|---|---|---|---|"]
-    for name in COMMANDS:
-        of = [row for row in rows if row["command"] == name]
-        if of:
-            seconds = sum(float(row["of_seconds"]) for row in of) / len(of)
-            kills = sum(row["second"] != "had ended" for row in of)
-            resumed = sum(row["second"] == "resume" for row in of)
-            same = sum(row["same"] == "1" for row in of)
-            lines.append(f"| `{name}` | {seconds:.1f} | {kills} | {resumed or ''} | {same} of {len(of)} |")
-    same = sum(row["same"] == "1" for row in rows)
-    lines.append(f"| all | | {sum(row['second'] != 'had ended' for row in rows)} | | {same} of {len(rows)} |")
+    head = "| command | fault | seconds | cut short | resumed | by --force | same bytes afterwards |"
+    lines = [head, "|---|---|---|---|---|---|---|"]
+    count = lambda of, second: sum(row["second"] == second for row in of)
+    for fault in FAULTS:
+        for name in (*COMMANDS, "all"):
+            of = [row for row in rows if row["fault"] == fault and name in ("all", row["command"])]
+            if of:
+                seconds = sum(float(row["of_seconds"]) for row in of) / len(of)
+                cut = len(of) - count(of, "had ended")
+                same = f"{sum(row['same'] == '1' for row in of)} of {len(of)}"
+                numbers = (f"{seconds:.1f}", cut, count(of, "resume"), count(of, "again by --force"), same)
+                lines.append(f"| `{name}` | {fault} | {' | '.join(map(str, numbers))} |")
     return "\n".join(lines) + "\n"
 
 
@@ -226,26 +245,21 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", help="dimcmc")
     parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--full", type=int, default=0, help="full disks, which need root")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--work", type=Path, default=Path("target/kill-check"))
-    parser.add_argument("--csv", type=Path, default=Path("results/calibration/kills.csv"))
+    parser.add_argument("--work", type=Path, default=Path("target/faults"))
+    parser.add_argument("--csv", type=Path, default=Path("results/calibration/faults.csv"))
     parser.add_argument("--table", action="store_true", help="print the table of the lines so far")
     args = parser.parse_args()
     if args.table:
-        print(table(read(args.csv)))
+        print(table(calibration_table.read(args.csv)))
     elif args.program:
         args.program = str(Path(args.program).resolve())
         bench, rng = Bench(args), random.Random(args.seed)
-        each = -(-args.kills // len(COMMANDS))
         for name in COMMANDS:
             seconds, reference = bench.reference(name)
-            for _ in range(each):
-                line = bench.killed(name, seconds, reference, rng.random())
-                anew = not args.csv.exists()
-                with open(args.csv, "a", newline="") as file:
-                    writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-                    if anew:
-                        writer.writeheader()
-                    writer.writerow(line)
+            for fault, times in ((bench.killed, args.kills), (bench.full, args.full)):
+                for _ in range(-(-times // len(COMMANDS))):
+                    calibration_table.append(args.csv, COLUMNS, fault(name, seconds, reference, rng.random()))
     else:
         parser.error("--program, or --table")
