@@ -8,7 +8,7 @@ fresh copy of what it reads, killed (SIGKILL) after a random share of that time,
 `--resume` where the command has it and its folder holds a run, with `--force` where the message asks for it as the
 folder holds some of the files, otherwise as before. Afterwards the folder must hold the same bytes as that of the run
 that was not killed, but for times, and nothing else, no temporary file either. Disks are full after a random share of
-what a command writes, and have room again when it is run once more. The second command prints the table. Linux; needs
+what a command writes, and have room again when it is run once more. The second command writes the table. Linux; needs
 numpy, and full disks need root.
 """
 
@@ -249,10 +249,12 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--work", type=Path, default=Path("target/faults"))
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/faults.csv"))
-    parser.add_argument("--table", action="store_true", help="print the table of the lines so far")
+    parser.add_argument("--out", type=Path, default=Path("results/reliability.md"))
+    parser.add_argument("--table", action="store_true", help="write the table of the lines so far")
     args = parser.parse_args()
     if args.table:
-        print(table(calibration_table.read(args.csv)))
+        lines = table(calibration_table.read(args.csv))
+        calibration_table.under_the_head(args.out, "Kills and full disks", lines)
     elif args.program:
         args.program = str(Path(args.program).resolve())
         bench, rng = Bench(args), random.Random(args.seed)
