@@ -47,7 +47,7 @@ def simulated(effect, number):
     """The simulator's seed of a star: the same stars say what an effect changes, others how often it misleads."""
     if number <= SHARED or effect in COMPARED:
         return number
-    return number + 10 * EFFECTS.index(effect)
+    return number + 1000 * EFFECTS.index(effect)
 
 
 def with_setting(config, setting):

@@ -100,7 +100,7 @@ def of_others(rng, seed, folder, run, simulator):
     while abs(math.log(second / first)) < 0.35 or abs(math.log(second / prot)) < 0.25:
         second = drawn(rng)
     known = ("--rotation-period", prot, "--inclination", inclination)
-    run("init", "first/observations.txt", *known, "--out", "first.json")
+    run("init", "first/observations.txt", *known, "--out", "first.json", "--force")
     phase, epoch_d = rng.random(), json.loads((folder / "first.json").read_text())["star"]["epoch_d"]
     orbit = ("--k-kms", K_KMS[1], "--porb-over-prot", second / prot, "--phi", phase)
     run("inject", "first.json", *orbit, "--out", "data", "--force")

@@ -15,6 +15,7 @@ use super::dense::{self, Factor, inverses, scale_rows};
 use super::numbers::Numbers;
 use super::tilt::Tilt;
 use super::{Degrees, Epoch, Field, FieldError, Quadratic};
+use crate::numerics::once;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -144,7 +145,7 @@ impl Evidence {
     }
 
     /// How many numbers of each epoch the field explains; `None` where no model is divided by anything.
-    pub(super) fn explained(&self) -> Option<&[f64]> {
+    pub(crate) fn explained(&self) -> Option<&[f64]> {
         let tilt = self.tilt.as_ref()?;
         let found = || {
             // without the numbers of the volume
@@ -155,7 +156,7 @@ impl Evidence {
                 Covariance::new(&numbers, numbers.spatial_of_few(), &self.field.kernel, self.covariance.directions());
             covariance.map_or_else(|| tilt.explained.clone(), |covariance| covariance.explained(&numbers))
         };
-        Some(self.explained.get_or_init(found))
+        Some(once::found(&self.explained, found).as_slice())
     }
 
     /// ln Z, all constants included.

@@ -161,7 +161,9 @@ impl Checks {
             return worse.iter().map(of).map(one).collect();
         }
         let many = worse.len();
-        worse.sort_by(|(_, a), (_, b)| a.p_value.total_cmp(&b.p_value));
+        // probabilities of the worst may be 0
+        let excess = |profile: &ProfileCheck| profile.chi2 / profile.data as f64;
+        worse.sort_by(|(_, a), (_, b)| a.p_value.total_cmp(&b.p_value).then(excess(b).total_cmp(&excess(a))));
         let (profile, size) = of(&worse[0]);
         vec![format!("{many} profiles fit worse than the others (all in fit.json of a map), worst {profile}: {size}")]
     }

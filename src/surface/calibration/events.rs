@@ -78,12 +78,11 @@ impl Events {
         if named.len() > NAMED {
             named.sort_by(|a, b| b.sigma_factor.total_cmp(&a.sigma_factor));
             named.truncate(NAMED);
-            named.sort_by_key(|event| event.profile);
         }
         let all = named.iter().map(of).collect::<Vec<_>>().join(", ");
         let line = || match self.profiles.len() {
             1 => format!("outlier profile {all}"),
-            many if many > NAMED => format!("{many} outlier profiles, the largest {all}"),
+            many if many > NAMED => format!("{many} outlier profiles (all in measured.events); largest: {all}"),
             _ => format!("outlier profiles {all}"),
         };
         self.too_many().or((!self.profiles.is_empty()).then(line))
@@ -111,7 +110,7 @@ mod tests {
         assert_eq!(one, "outlier profile 3 (0.1000 d, uncertainties × 2.5)");
         let larger = |k: usize| Event { sigma_factor: k as f64, ..event(k) };
         let seven = Events::among((1..=7).map(larger).collect(), &[ByHand::Event; 24]).line().unwrap();
-        assert!(seven.starts_with("7 outlier profiles, the largest 3 (0.1000 d"), "{seven}");
-        assert!(seven.ends_with(", 7 (0.1000 d, uncertainties × 7.0)"), "{seven}");
+        assert!(seven.starts_with("7 outlier profiles (all in measured.events); largest: 7 (0.1000 d"), "{seven}");
+        assert!(seven.ends_with(", 3 (0.1000 d, uncertainties × 3.0)"), "{seven}");
     }
 }

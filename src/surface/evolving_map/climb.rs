@@ -11,7 +11,7 @@ const JITTER_KMS: (f64, f64) = (1e-3, 3.0);
 
 /// A search ends when a step would gain less than this in ln Z, or after so many.
 pub(super) const GAIN: f64 = 0.02;
-const STEPS: usize = 25;
+pub(super) const STEPS: usize = 25;
 
 /// Step of the derivatives of ln Z: errors of ln Z of 0.03 are some 10 in its second derivative.
 const STEP: f64 = 0.1;
@@ -59,12 +59,13 @@ pub(super) struct Top {
     pub hessian: Matrix4<f64>,
 }
 
-/// The way up from `first` by quasi-Newton steps (BFGS; Nocedal & Wright 2006, chapter 6), within the bounds. How the
-/// numbers depend on each other is as in the second derivatives `nearby`, if there are any.
+/// The way up from `first` by so many quasi-Newton steps at most (BFGS; Nocedal & Wright 2006, chapter 6), within the
+/// bounds. How the numbers depend on each other is as in the second derivatives `nearby`, if there are any.
 pub(super) fn climb(
     first: Marginal,
     known: &Known,
     nearby: Option<Matrix4<f64>>,
+    steps: usize,
     at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
 ) -> Result<Top, FieldError> {
     let (free, limits) = (known.free(&first.assumed), limits(known));
@@ -73,6 +74,10 @@ pub(super) fn climb(
     // determinant changes with the maps, and outweighs the rest
     let slope = |of: &Marginal| {
         let from = place(&of.assumed);
+        if free.contains(&true) {
+            // once, before two ask for it
+            of.settled.evidence.explained();
+        }
         let beside = |i: usize, h: f64| {
             let mut to = from;
             to[i] += h;
@@ -104,7 +109,7 @@ pub(super) fn climb(
     let scale =
         bend.zip_map(&hessian.diagonal(), |bend, was| if bend > LEAST_BEND { (bend / was).sqrt() } else { 1.0 });
     hessian.component_mul_assign(&(scale * scale.transpose()));
-    for _ in 0..STEPS {
+    for taken in 1..=steps {
         let from = place(&here.assumed);
         // what pushes against a bound stays there
         let pushes = |i: usize| {
@@ -125,7 +130,7 @@ pub(super) fn climb(
         let moved = Vector4::from_fn(|i, _| if free[i] { place(&next.assumed)[i] - from[i] } else { 0.0 });
         let gained = height(&next) - height(&here);
         here = next;
-        if gained < 0.1 * GAIN {
+        if gained < 0.1 * GAIN || taken == steps {
             break;
         }
         let (there, _) = slope(&here);

@@ -6,7 +6,7 @@
 //! all profiles was theirs, until no profile is left that fails. A jitter is fitted even where the config has one: a
 //! planet moves every profile, and is no event.
 
-use super::fit::{fit, is_many};
+use super::fit::fit;
 use super::star::DEGREE;
 use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::model::{Parameter, ParameterValues};
@@ -90,10 +90,7 @@ pub fn events(
         let factor = |event: &Option<Event>| event.as_ref().map_or(1.0, |event| event.sigma_factor);
         let of_all = imager.with_larger_errors(&found.iter().map(factor).collect::<Vec<_>>());
         if round > 0 || known.jitter_kms.is_some() {
-            // a round of many profiles would take as long as the search, and events hardly change their field
-            let held = round > 1 && is_many(imager);
-            let known = if held { Known::of(&near.marginal) } else { with_jitter };
-            near = fit(&of_all, &basis, values, known, Some(&near))?;
+            near = fit(&of_all, &basis, values, with_jitter, Some(&near))?;
         }
         let ratios = over_usual(&of_all, &near.marginal.predicted_chi2(&of_all)?);
         let chance = |k: usize| chi2_exceeds(ratios[k].0 * ratios[k].1, ratios[k].1);

@@ -1,7 +1,7 @@
 //! What the profiles say of the field itself: the amplitude, slope and lifetime for which ln Z is largest, and the
 //! jitter.
 
-use super::climb::{GAIN, Top, climb, limits, place};
+use super::climb::{GAIN, STEPS, Top, climb, limits, place};
 use super::known::{Known, USUAL};
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
@@ -9,6 +9,7 @@ use crate::model::{Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
 use nalgebra::Matrix4;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
@@ -22,6 +23,9 @@ const USUAL_JITTER_KMS: f64 = 0.1;
 
 /// A fit of so many profiles starts from that of a share of them, at most half as many.
 const MANY: usize = 160;
+
+/// Parts of this are spread evenly, and never come again.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Beyond so many profiles times squared harmonics a climb of 20 to 40 evaluations takes minutes: 411 profiles of a
 /// star of 30 km/s (some 800 harmonics) are 2.6e8, 226 of one of 90 km/s (1,344) 4.1e8.
@@ -94,8 +98,7 @@ pub(in crate::surface) fn usual(
 
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
 /// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
-/// has a break included. Where a climb with all of them takes minutes, or maps are rough, the field is that of the
-/// share.
+/// has a break included. Where a climb with all of them takes minutes the field is that of the share.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -106,32 +109,25 @@ pub fn fit(
     known: Known,
     near: Option<&Fitted>,
 ) -> Result<Fitted, NoFit> {
-    bent(imager, basis, values, known, (near, None))
-}
-
-/// The same; where it begins from what is `known`, with second derivatives like these.
-fn bent(
-    imager: &Imager,
-    basis: &Arc<Basis>,
-    values: ParameterValues,
-    known: Known,
-    (near, bend): (Option<&Fitted>, Option<Matrix4<f64>>),
-) -> Result<Fitted, NoFit> {
     let design = Arc::new(Design::new(imager, basis, &values.state()));
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
-    let share = share_of_many(imager).filter(|_| known.is_open());
-    if let Some(share) = share.as_ref().filter(|_| is_said_by_a_share(imager, basis)) {
-        return by_a_share((imager, share), (basis, &design), values, known, near, &at);
+    let many = known.is_open() && is_many(imager);
+    if many
+        && takes_minutes(imager, basis)
+        && let Some(fitted) = by_a_share(imager, (basis, &design), values, known, near, &at)?
+    {
+        return Ok(fitted);
     }
     // the field that a fit begins from has or has no break
     let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
     let is_near = near.is_some() || begin.is_some();
-    let share = share.filter(|_| !is_near).and_then(|share| fit(&share, basis, values, known, None).ok());
+    let share = if many && !is_near { share_of_many(imager) } else { None };
+    let share = share.and_then(|share| fit(&share, basis, values, known, None).ok());
     let (first, hessian) = match (near, begin, &share) {
         (Some(Fitted { marginal, hessian, .. }), ..) => (anew(marginal.assumed, marginal, &at)?, *hessian),
-        (None, Some(begin), _) => (begin, bend),
+        (None, Some(begin), _) => (begin, None),
         (None, None, Some(Fitted { marginal: share, hessian, .. })) => {
             (of_share(share, (imager, basis, &design), values, &at)?, *hessian)
         }
@@ -153,7 +149,10 @@ fn bent(
             (at(best.assumed, Some(&best))?, None)
         }
     };
-    let mut top = climb(first, &known, hessian, &at)?;
+    // from what a share or another fit says it is not far, and rough maps need be good to a few tenths only
+    let is_fitted = share.is_some() || near.map_or(is_near, |near| near.hessian.is_some());
+    let few = many && basis.is_rough() && is_fitted;
+    let mut top = climb(first, &known, hessian, if few { 1 } else { STEPS }, &at)?;
     if !is_near && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
         top = with_or_without_break(top, &known, &at)?;
     }
@@ -161,47 +160,45 @@ fn bent(
         top = with_or_without_jitter(top, &known, &at)?;
     }
     let Top { marginal, hessian } = top;
+    fitted(marginal, Some(hessian), &known)
+}
+
+/// The fit that ends with these.
+fn fitted(marginal: Marginal, hessian: Option<Matrix4<f64>>, known: &Known) -> Result<Fitted, NoFit> {
     let ln_evidence = marginal.ln_evidence();
     if !ln_evidence.is_finite() {
         return Err(NoFit::NotFinite);
     }
-    let at_bounds = reached(&marginal.assumed, &known);
-    Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) })
+    let at_bounds = reached(&marginal.assumed, known);
+    Ok(Fitted { marginal, ln_evidence, at_bounds, hessian })
 }
 
-/// Whether the field is that of a share: where a climb takes minutes, and where ln Z is good to a few tenths only.
-fn is_said_by_a_share(imager: &Imager, basis: &Basis) -> bool {
-    basis.is_rough() || imager.profiles().count() as f64 * (basis.len() as f64).powi(2) > LONG
+/// Whether a climb with all profiles does.
+fn takes_minutes(imager: &Imager, basis: &Basis) -> bool {
+    imager.epochs() as f64 * (basis.len() as f64).powi(2) > LONG
 }
 
-/// The profiles with the field of a share of them, or of a fit `near` by where the share does not tell it: those that
-/// follow each other closely say nearly the same of the field.
+/// The profiles with the field of a share of them, or of a fit `near` by where maps of the share are not found: those
+/// that follow each other closely say nearly the same of the field. `None` where neither is there.
 fn by_a_share(
-    (imager, share): (&Imager, &Imager),
+    imager: &Imager,
     (basis, design): (&Arc<Basis>, &Arc<Design>),
     values: ParameterValues,
     known: Known,
     near: Option<&Fitted>,
     at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
-) -> Result<Fitted, NoFit> {
-    let more = imager.profiles().count() as f64 / share.profiles().count() as f64;
+) -> Result<Option<Fitted>, NoFit> {
+    let Some(share) = share_of_many(imager) else { return Ok(None) };
     let start = near.map(|near| near.marginal.assumed.into()).or(known.start);
-    let bend = near.and_then(|near| near.hessian).map(|hessian| hessian / more);
-    let found = bent(share, basis, values, Known { start, ..known }, (None, bend));
-    let (marginal, hessian, at_bounds) = match (found, near) {
-        (Ok(of), Some(near)) => (anew(of.marginal.assumed, &near.marginal, at)?, of.hessian, of.at_bounds),
-        (Ok(Fitted { marginal: of, hessian, at_bounds, .. }), None) => {
-            (of_share(&of, (imager, basis, design), values, at)?, hessian, at_bounds)
+    let (marginal, hessian) = match (fit(&share, basis, values, Known { start, ..known }, None), near) {
+        (Ok(of), Some(near)) => (anew(of.marginal.assumed, &near.marginal, at)?, of.hessian),
+        (Ok(of), None) => (of_share(&of.marginal, (imager, basis, design), values, at)?, of.hessian),
+        (Err(NoFit::Field(FieldError::NotSettled { .. })), Some(near)) => {
+            (anew(near.marginal.assumed, &near.marginal, at)?, near.hessian)
         }
-        (Err(_), Some(near)) => (anew(near.marginal.assumed, &near.marginal, at)?, near.hessian, Vec::new()),
-        (Err(none), None) => return Err(none),
+        (Err(_), _) => return Ok(None),
     };
-    match marginal.ln_evidence() {
-        ln_evidence if ln_evidence.is_finite() => {
-            Ok(Fitted { marginal, ln_evidence, at_bounds, hessian: hessian.map(|hessian| hessian * more) })
-        }
-        _ => Err(NoFit::NotFinite),
-    }
+    fitted(marginal, hessian, &known).map(Some)
 }
 
 /// All profiles with the field of a share of them.
@@ -224,9 +221,20 @@ fn anew(
     at(assumed, Some(near)).or_else(|_| at(assumed, None))
 }
 
-/// A share of the profiles where there are [`MANY`]: at most half as many as that.
+/// A share of the profiles where there are [`MANY`]: one of so many that follow each other in a data set, at most half
+/// as many as that in all, but one of a set at least. Which one changes: profiles at even times would show a star of
+/// the same period from one side.
 pub(super) fn share_of_many(imager: &Imager) -> Option<Imager> {
-    is_many(imager).then(|| share_of(imager, MANY / 2)).flatten()
+    let profiles = imager.profiles().count();
+    let every = profiles.div_ceil(MANY / 2);
+    let chosen = |set: Range<usize>| {
+        let first = |k: usize| set.start + k * every;
+        let one = |k: usize| first(k) + ((k as f64 * GOLDEN).fract() * every.min(set.end - first(k)) as f64) as usize;
+        (0..set.len().div_ceil(every)).map(one).collect::<Vec<_>>()
+    };
+    let kept: Vec<usize> = imager.profiles_of_sets().into_iter().flat_map(chosen).collect();
+    let others = || (0..profiles).filter(|k| !kept.contains(k)).collect::<Vec<_>>();
+    (is_many(imager) && kept.len() < MANY).then(|| imager.without(&others()))
 }
 
 /// Whether there are so many profiles that a share tells their field.
@@ -290,7 +298,7 @@ fn with_or_without_break(
     let height = known.height(&fitted.marginal);
     match at(assumed, Some(&fitted.marginal)) {
         Ok(other) if known.height(&other) > height - FAR_BELOW => {
-            let other = climb(other, known, None, at)?;
+            let other = climb(other, known, None, STEPS, at)?;
             Ok(if known.height(&other.marginal) > height { other } else { fitted })
         }
         _ => Ok(fitted),
@@ -311,7 +319,7 @@ fn with_or_without_jitter(
     if known.height(&other) < known.height(&fitted.marginal) + needed {
         return Ok(fitted);
     }
-    climb(other, known, None, at)
+    climb(other, known, None, STEPS, at)
 }
 
 /// Which of the fitted numbers lie on a bound.

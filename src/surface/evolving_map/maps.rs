@@ -3,6 +3,7 @@
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, approach, settle};
 use crate::model::ParameterValues;
+use crate::numerics::once;
 use crate::surface::imaging::Imager;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -84,7 +85,7 @@ impl Marginal {
     /// How the numbers of each epoch change with a velocity, at the most probable maps (numbers, 1).
     pub(super) fn velocity_slopes(&self, imager: &Imager) -> &[DMatrix<f64>] {
         let found = || self.design.velocity_slopes((imager, &self.basis), &self.values, &self.settled.coefficients);
-        self.velocity_slopes.get_or_init(found)
+        once::found(&self.velocity_slopes, found).as_slice()
     }
 }
 

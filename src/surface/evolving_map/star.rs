@@ -377,6 +377,8 @@ impl<'a> Climb<'a> {
                 (None, None) => (0.0, bend[(i, i)]),
             }
         };
+        // once, before all ask for it
+        at.marginal.settled.evidence.explained();
         let all: Vec<(f64, f64)> = (0..self.limits.len()).into_par_iter().map(along).collect();
         let of = |which: &dyn Fn(&(f64, f64)) -> f64| DVector::from_iterator(all.len(), all.iter().map(which));
         (of(&|a| a.0), of(&|a| a.1))
