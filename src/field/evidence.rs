@@ -108,8 +108,8 @@ impl Evidence {
             let explained = match explained {
                 Some(explained) => explained,
                 None => {
-                    let found = factored(&numbers, spatial.clone())?.explained(&numbers);
-                    own.get_or_init(|| found).clone()
+                    let explained = factored(&numbers, spatial.clone())?.explained(&numbers);
+                    once::found(&own, || explained).clone()
                 }
             };
             let tilt = tilt.insert(Tilt::new(explained, epochs));

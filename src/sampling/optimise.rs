@@ -4,6 +4,7 @@
 //!
 //! Knows densities through [`Gradient`] alone.
 
+use crate::numerics::once;
 use crate::sampling::log_density::{Evaluation, Gradient};
 use argmin::core::{
     CostFunction, Error, Executor, Gradient as ArgminGradient, Hessian, IterState, KV, Problem, Solver, State,
@@ -199,7 +200,7 @@ impl<D: Gradient> Landscape<'_, D> {
         let columns: Vec<Vector> = (0..x.len())
             .into_par_iter()
             .map(|j| {
-                let middle = || here.get_or_init(|| self.slope(x).unwrap_or_else(|| Vector::zeros(x.len()))).clone();
+                let middle = || once::found(&here, || self.slope(x).unwrap_or_else(|| Vector::zeros(x.len()))).clone();
                 match (at(j, HESSIAN_STEP), at(j, -HESSIAN_STEP)) {
                     (Some((h, plus)), Some((back, minus))) => (plus - minus) / (h - back),
                     (Some((h, there)), None) | (None, Some((h, there))) => (there - middle()) / h,

@@ -143,9 +143,7 @@ impl Checks {
         }
         doubts
     }
-}
 
-impl Checks {
     /// Profiles that fit worse than the others: each, or of more than [`NAMED`] how many and the worst.
     fn of_profiles(&self) -> Vec<String> {
         let rare = RARE / self.profiles.len() as f64;

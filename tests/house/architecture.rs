@@ -221,6 +221,20 @@ fn all_but_the_command_line_are_silent() {
     hold(faults);
 }
 
+/// What is found by a cell's own `get_or_init` holds the cell meanwhile: jobs within that ask for it wait for themselves.
+#[test]
+fn what_is_found_once_holds_no_cell() {
+    let mut faults = Vec::new();
+    for source in in_rooms().filter(|source| !source.path.ends_with("numerics/once.rs")) {
+        for (line, code) in source.code() {
+            if code.contains("get_or_init") || code.contains("get_or_try_init") {
+                faults.push(format!("{}:{line}: numerics::once::found does it without a lock", source.path.display()));
+            }
+        }
+    }
+    hold(faults);
+}
+
 #[test]
 fn every_file_says_what_it_is() {
     let silent = sources().into_iter().filter(|source| !source.text.starts_with("//! "));

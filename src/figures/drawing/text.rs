@@ -5,7 +5,7 @@
 
 use super::colour::{BLACK, Colour};
 use super::{LABEL_PT, Point, SMALL_PT, Segment};
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 /// Size and colour of a text.
@@ -64,13 +64,13 @@ pub(crate) struct Shape {
 }
 
 fn face(italic: bool) -> &'static Face<'static> {
-    static FACES: [OnceLock<Face<'static>>; 2] = [OnceLock::new(), OnceLock::new()];
+    static FACES: [LazyLock<Face<'static>>; 2] = [LazyLock::new(|| read(REGULAR)), LazyLock::new(|| read(ITALIC))];
     const REGULAR: &[u8] = include_bytes!("font/OpenSans-Regular.ttf");
     const ITALIC: &[u8] = include_bytes!("font/OpenSans-Italic.ttf");
-    FACES[usize::from(italic)].get_or_init(|| {
-        let bytes = if italic { ITALIC } else { REGULAR };
-        Face::parse(bytes, 0).expect("a font that comes with the program can be read")
-    })
+    fn read(font: &'static [u8]) -> Face<'static> {
+        Face::parse(font, 0).expect("a font that comes with the program can be read")
+    }
+    &FACES[usize::from(italic)]
 }
 
 /// A character with the style that the markup gives it.

@@ -12,6 +12,7 @@ use super::false_alarm::FalseAlarm;
 use super::jitter::{Jitters, ln_prior};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
+use crate::numerics::once;
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use std::sync::OnceLock;
@@ -139,7 +140,7 @@ impl<'a> Injections<'a> {
     }
 
     fn level(&self, field: &Field, size: &Size) -> f64 {
-        *size.level.get_or_init(|| {
+        *once::found(&size.level, || {
             let velocities = &field.star.velocities;
             let jitters = match size.kms > 0.0 {
                 true => Jitters::new(velocities, size.kms, field.scale_kms),

@@ -238,7 +238,7 @@ pub(super) fn share_of_many(imager: &Imager) -> Option<Imager> {
 }
 
 /// Whether there are so many profiles that a share tells their field.
-pub(super) fn is_many(imager: &Imager) -> bool {
+fn is_many(imager: &Imager) -> bool {
     imager.profiles().count() >= MANY
 }
 

@@ -9,6 +9,7 @@
 use super::{Marginal, MarginalPosterior};
 use crate::field::FieldError;
 use crate::model::{Parameter, ParameterSpace};
+use crate::numerics::once;
 use crate::sampling::log_density::{Evaluation, Gradient, LogDensity, Status};
 use crate::surface::expansion::{Expansion, STELLAR, stellar_step};
 use nalgebra::DVector;
@@ -39,7 +40,7 @@ impl MarginalPosterior {
     /// # Errors
     /// [`FieldError`], where ln Z cannot be had beside the reference.
     pub fn expansion(&self) -> Result<&Expansion, FieldError> {
-        self.expansion.get_or_init(|| self.expand()).as_ref().map_err(|error| *error)
+        once::found(&self.expansion, || self.expand()).as_ref().map_err(|error| *error)
     }
 
     fn expand(&self) -> Result<Expansion, FieldError> {
