@@ -46,7 +46,9 @@ impl Signals {
                     code.store(RESUME, Ordering::SeqCst);
                 }
                 if !deferred.load(Ordering::SeqCst) {
-                    if let Some(undo) = undo.lock().unwrap_or_else(PoisonError::into_inner).take() {
+                    // held to the end: what is not made yet is not made any more
+                    let mut undo = undo.lock().unwrap_or_else(PoisonError::into_inner);
+                    if let Some(undo) = undo.take() {
                         undo();
                     }
                     console::error_below_progress(before_the_first(unit));

@@ -227,17 +227,29 @@ impl Imager {
     /// The RV offsets of nights, of each data set whose profiles share some; for so many coordinates of an expansion,
     /// of which the velocities of all profiles come first.
     pub fn night_offsets(&self, coordinates: usize) -> Vec<Common> {
-        let times_d = self.times_d();
         let of_set = |(set, &sd_kms): (usize, &f64)| {
-            let profiles = self.profiles_of(set);
-            let first = profiles.start;
-            nights(&times_d[profiles], NIGHT_GAP_D).into_iter().map(move |night| {
+            self.nights_of(set).into_iter().map(move |night| {
                 let mut of_each = DVector::zeros(coordinates);
-                night.iter().for_each(|k| of_each[first + k] = 1.0);
+                night.iter().for_each(|k| of_each[*k] = 1.0);
                 Common { of_each, mean_kms: 0.0, sd_kms }
             })
         };
         self.night_jitters_kms.iter().enumerate().filter(|(_, sd_kms)| **sd_kms > 0.0).flat_map(of_set).collect()
+    }
+
+    /// The nights of a data set, by the numbers of their profiles.
+    fn nights_of(&self, set: usize) -> Vec<Vec<usize>> {
+        let (times_d, profiles) = (self.times_d(), self.profiles_of(set));
+        let first = profiles.start;
+        let mut all = nights(&times_d[profiles], NIGHT_GAP_D);
+        all.iter_mut().flatten().for_each(|k| *k += first);
+        all
+    }
+
+    /// Nights of each data set, by the numbers of their profiles; none where the size of their offsets is known.
+    pub fn nights_of_sets(&self) -> Vec<Vec<usize>> {
+        let sets = if self.night_jitters_kms.is_empty() { self.sets.len() } else { 0 };
+        (0..sets).flat_map(|set| self.nights_of(set)).collect()
     }
 
     /// The same with drifts of the velocities: that of all profiles whose offsets are known, and one of each data set

@@ -4,6 +4,7 @@
 use super::{Detection, DetectionSettings, KnownPlanet, Robustness};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
+use crate::planets::periodogram::nights::NightOffsets;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::posterior_shares;
 use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
@@ -82,6 +83,18 @@ impl Detection {
         let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         remarks.extend(self.of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
+        if let Some(nights) = self.nights.filter(|nights| nights.false_alarm_probability > CANDIDATE_FAP) {
+            let NightOffsets { sigma_kms, false_alarm_probability, .. } = nights;
+            remarks.push(Remark::against(
+                "RV offsets of nights explain it as well",
+                format!(
+                    "RV offsets of {:.0} m/s from night to night explain the signal as well: FAP = {:.0} % beside them. \
+                    If those of the spectrograph are known, give observations.night_jitter_kms.",
+                    1000.0 * sigma_kms,
+                    100.0 * false_alarm_probability
+                ),
+            ));
+        }
         if self.highest().on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",

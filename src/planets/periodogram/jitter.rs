@@ -38,7 +38,7 @@ pub struct Level {
     pub quadratic: VelocityQuadratic,
     /// ln L at velocities 0, the prior of the size counted, above that of the best size.
     pub ln_l: f64,
-    /// From deviates to the gradient of a star without a planet.
+    /// Transposed: from deviates to the gradient of a star without a planet.
     pub(super) root: DMatrix<f64>,
     /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
     pub(super) constant: f64,

@@ -11,6 +11,7 @@ pub mod frequencies;
 pub mod injections;
 mod jitter;
 pub mod limits;
+pub mod nights;
 pub mod offset;
 pub mod orbits;
 pub mod peaks;

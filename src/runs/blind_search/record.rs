@@ -8,6 +8,7 @@ use crate::inference::detection::{HeldOut, KnownPlanet, Robustness, WithoutNight
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{OrbitQuantities, ParameterValues};
 use crate::numerics::json::number_or_null;
+use crate::planets::periodogram::nights::NightOffsets;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{CircularOrbit, KeplerianOrbit, Search};
@@ -323,6 +324,9 @@ pub struct RobustnessRecord {
     /// The sum over them of what the planet adds to their prediction; null for less than two nights.
     #[serde(default)]
     pub held_out_nights: Option<HeldOut>,
+    /// What RV offsets of nights make of a candidate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub night_offsets: Option<NightOffsets>,
 }
 
 /// The orbit at the best period with another target chi2.
@@ -438,7 +442,10 @@ impl PeriodogramFile {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),
             },
-            robustness: search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default(),
+            robustness: RobustnessRecord {
+                night_offsets: found.nights,
+                ..search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default()
+            },
             evidence: search.evidence.clone(),
             warnings: search.remarks.iter().map(|remark| remark.text.clone()).collect(),
             provenance: Provenance { measured: search.measured(), ..scene.provenance() },
@@ -538,6 +545,7 @@ impl RobustnessRecord {
         };
         RobustnessRecord {
             held_out_nights: found.held_out(),
+            night_offsets: None,
             targets: found.targets.iter().map(target).collect(),
             without_night: found.nights.iter().map(night).collect(),
         }
