@@ -281,14 +281,14 @@ impl Detection {
                 ),
             ));
         }
-        for night in robustness.decisive_nights(level) {
-            remarks.push(Remark::against(
-                "driven by a single night",
-                format!(
-                    "The signal depends on the night of {:.2} ({} profiles): see the leave-one-night-out K.",
-                    night.span_d.0, night.profiles
-                ),
-            ));
+        let decisive = robustness.decisive_nights(level);
+        if let Some(night) = decisive.first() {
+            let which = match decisive.len() {
+                1 => format!("the night of {:.2} ({} profiles)", night.span_d.0, night.profiles),
+                all => format!("each of {all} nights of {}", robustness.nights.len()),
+            };
+            let text = format!("The signal depends on {which}: see the leave-one-night-out K.");
+            remarks.push(Remark::against("driven by a single night", text));
         }
         remarks
     }

@@ -19,6 +19,9 @@ const JITTERS: [f64; 4] = [0.1, 0.35, 0.7, 1.0];
 /// Offsets that are tried, of the scatter of the velocities: from the first to the last, each larger by a factor.
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
+/// Scale of the prior of the offsets of a spectrograph of unknown stability (km/s): that of ESPaDOnS and Narval.
+const USUAL_KMS: f64 = 0.03;
+
 /// A jitter is this part of the error of a velocity at least, so that J has an inverse.
 const LEAST: f64 = 0.01;
 
@@ -34,7 +37,7 @@ pub struct NightOffsets {
 }
 
 /// What offsets of `nights` make of a search beside a jitter, which is `found_kms` without a planet and has a prior of
-/// that scale; the offsets have the same prior. `None` where each night has one profile, whose offset is a jitter, or
+/// that scale; the offsets have the same prior, or that of [`USUAL_KMS`]. `None` where each night has one profile, whose offset is a jitter, or
 /// the search has no bounded orbit.
 pub fn night_offsets(
     without: &VelocityQuadratic,
@@ -90,7 +93,7 @@ struct Tried {
 impl Tried {
     /// ln of the prior.
     fn ln_prior(&self, scale_kms: Option<f64>) -> f64 {
-        ln_prior(self.jitter_kms, scale_kms) + ln_prior(self.night_kms, scale_kms)
+        ln_prior(self.jitter_kms, scale_kms) + ln_prior(self.night_kms, scale_kms.or(Some(USUAL_KMS)))
     }
 
     /// The covariance of both, `same` being 1 for two profiles of one night.
@@ -201,13 +204,14 @@ mod tests {
         let above = density(0.02, 0.07).0 - density(0.0, 0.0).0;
         assert!((shape.height(&velocities).unwrap() - above).abs() < 1e-8);
         let jitters = shape.jitters(&velocities, tried, None);
+        let prior = |part: f64| ln_prior(part * 0.07, Some(USUAL_KMS));
         for level in jitters.levels() {
             let part = level.size_kms / 0.07;
             let (ln_l, inverse) = density(part * 0.02, part * 0.07);
             assert!((&level.quadratic.information - &inverse).norm() < 1e-8 * inverse.norm(), "{part}");
             assert!((&level.quadratic.gradient - &inverse * &rv).norm() < 1e-8 * (&inverse * &rv).norm(), "{part}");
-            let first = density(0.0, 0.0).0;
-            assert!((level.ln_l - jitters.levels()[0].ln_l - (ln_l - first)).abs() < 1e-8, "{part}");
+            let above = ln_l + prior(part) - density(0.0, 0.0).0;
+            assert!((level.ln_l - jitters.levels()[0].ln_l - above).abs() < 1e-8, "{part}");
             // gradients of a star with such nights
             let all = &noise + DMatrix::identity(36, 36) * 0.02f64.powi(2) + &same * 0.07f64.powi(2);
             let expected = &inverse * all * &inverse;
@@ -217,13 +221,14 @@ mod tests {
 
     #[test]
     fn offsets_of_nights_are_no_planet() {
-        let mut all: Vec<f64> = (0..40).map(|seed| found(0.08, 0.0, seed).false_alarm_probability).collect();
+        let found: Vec<NightOffsets> = (0..40).map(|seed| found(0.08, 0.0, seed)).collect();
+        let mut all: Vec<f64> = found.iter().map(|found| found.false_alarm_probability).collect();
         all.sort_by(f64::total_cmp);
         let apart = |(k, p): (usize, &f64)| (p - (k as f64 + 0.5) / 40.0).abs();
         let distance = all.iter().enumerate().map(apart).fold(0.0, f64::max);
         // exceeded once in a thousand by chance: 1.95 / sqrt(40)
         assert!(distance < 0.31 && all[0] > 1e-3, "{distance} {all:?}");
-        let sizes = (0..40).map(|seed| found(0.08, 0.0, seed).sigma_kms.powi(2)).sum::<f64>() / 40.0;
+        let sizes = found.iter().map(|found| found.sigma_kms.powi(2)).sum::<f64>() / 40.0;
         assert!((sizes.sqrt() / 0.08 - 1.0).abs() < 0.15, "{sizes}");
     }
 
