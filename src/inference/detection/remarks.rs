@@ -283,12 +283,15 @@ impl Detection {
         }
         let decisive = robustness.decisive_nights(level);
         if let Some(night) = decisive.first() {
-            let which = match decisive.len() {
-                1 => format!("the night of {:.2} ({} profiles)", night.span_d.0, night.profiles),
-                all => format!("each of {all} nights of {}", robustness.nights.len()),
+            let (short, which) = match decisive.len() {
+                1 => {
+                    let which = format!("the night of {:.2} ({} profiles)", night.span_d.0, night.profiles);
+                    ("driven by a single night", which)
+                }
+                all => ("driven by few nights", format!("each of {all} nights of {}", robustness.nights.len())),
             };
             let text = format!("The signal depends on {which}: see the leave-one-night-out K.");
-            remarks.push(Remark::against("driven by a single night", text));
+            remarks.push(Remark::against(short, text));
         }
         remarks
     }
