@@ -45,15 +45,16 @@ impl Signals {
                 if !by_hand {
                     code.store(RESUME, Ordering::SeqCst);
                 }
+                // held to the end: what is not made yet is not made any more
+                let mut undo = undo.lock().unwrap_or_else(PoisonError::into_inner);
                 if !deferred.load(Ordering::SeqCst) {
-                    // held to the end: what is not made yet is not made any more
-                    let mut undo = undo.lock().unwrap_or_else(PoisonError::into_inner);
                     if let Some(undo) = undo.take() {
                         undo();
                     }
                     console::error_below_progress(before_the_first(unit));
                     std::process::exit(code.load(Ordering::SeqCst).into());
                 }
+                drop(undo);
                 if stop.swap(true, Ordering::SeqCst) && by_hand {
                     std::process::exit(INTERRUPTED.into());
                 }
@@ -87,6 +88,7 @@ impl Signals {
 
     /// From now on there is something to lose.
     pub fn defer(&self) {
+        let _held = self.undo.lock().unwrap_or_else(PoisonError::into_inner);
         self.deferred.store(true, Ordering::SeqCst);
     }
 

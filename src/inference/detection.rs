@@ -19,7 +19,6 @@ pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, robustness};
 
 use crate::model::{Ephemeris, Parameter, ParameterValues};
 use crate::planets::periodogram::eccentric::keplerian;
-use crate::planets::periodogram::nights::{NightOffsets, night_offsets};
 use crate::planets::periodogram::offset::{Offset, offset};
 use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
@@ -115,8 +114,6 @@ pub struct Detection {
     pub rounds: usize,
     /// Whether K stays.
     pub closed: bool,
-    /// What RV offsets of nights make of a candidate; `None` where there is none, and where its jitter is known.
-    pub nights: Option<NightOffsets>,
     /// The best orbit, in the last expansion.
     pub best: Peak,
     /// Keplerian orbits around each peak of the search, if asked for: the first in the last expansion.
@@ -261,15 +258,11 @@ impl Detection {
             at_best: None,
             rounds: 0,
             closed: false,
-            nights: None,
             keplerian: Vec::new(),
             second: None,
             offset,
             co_rotation_penalty: None,
         };
-        if found.is_candidate() {
-            found.nights = found.beside_nights(imager, settings.search);
-        }
         // K of the known planets beside another that was found
         if !found.known.planets.is_empty() && found.is_candidate() && found.known.companion.is_none() {
             let frequency = 1.0 / found.blind.best().porb_over_prot;
@@ -354,14 +347,6 @@ impl Detection {
     /// Whether that is rare enough for a candidate.
     pub fn is_candidate(&self) -> bool {
         self.false_alarm_probability() < CANDIDATE_FAP
-    }
-
-    /// What RV offsets of nights make of the blind search.
-    fn beside_nights(&self, imager: &Imager, settings: SearchSettings) -> Option<NightOffsets> {
-        let WithoutJitter { here, found_kms, scale_kms } = self.without_jitter.as_ref()?;
-        let velocities = self.known.beside(&here.quadratic);
-        let nights = imager.nights_of_sets();
-        night_offsets(&velocities, &nights, (*found_kms, *scale_kms), &self.frequencies, settings)
     }
 
     /// Linearises the star with the best orbit until that orbit stays.

@@ -74,7 +74,7 @@ pub struct Imager {
     pub jitter_shares: Vec<f64>,
     /// Standard deviation of the RV offset that profiles of one night share (km/s), of each data set; empty where there
     /// is none. Only integrated maps know.
-    pub night_jitters_kms: Vec<f64>,
+    pub night_jitters_kms: Vec<Option<f64>>,
     /// Drifts of the velocities that are integrated out, of which only integrated maps know; mostly none.
     pub drifts: Vec<Drift>,
 }
@@ -227,14 +227,15 @@ impl Imager {
     /// The RV offsets of nights, of each data set whose profiles share some; for so many coordinates of an expansion,
     /// of which the velocities of all profiles come first.
     pub fn night_offsets(&self, coordinates: usize) -> Vec<Common> {
-        let of_set = |(set, &sd_kms): (usize, &f64)| {
+        let of_set = |(set, sd_kms): (usize, f64)| {
             self.nights_of(set).into_iter().map(move |night| {
                 let mut of_each = DVector::zeros(coordinates);
                 night.iter().for_each(|k| of_each[*k] = 1.0);
                 Common { of_each, mean_kms: 0.0, sd_kms }
             })
         };
-        self.night_jitters_kms.iter().enumerate().filter(|(_, sd_kms)| **sd_kms > 0.0).flat_map(of_set).collect()
+        let known = self.night_jitters_kms.iter().enumerate().filter_map(|(set, sd_kms)| Some((set, (*sd_kms)?)));
+        known.filter(|(_, sd_kms)| *sd_kms > 0.0).flat_map(of_set).collect()
     }
 
     /// The nights of a data set, by the numbers of their profiles.
@@ -246,10 +247,10 @@ impl Imager {
         all
     }
 
-    /// Nights of each data set, by the numbers of their profiles; none where the size of their offsets is known.
+    /// Nights of the data sets whose offsets are of unknown size, by the numbers of their profiles.
     pub fn nights_of_sets(&self) -> Vec<Vec<usize>> {
-        let sets = if self.night_jitters_kms.is_empty() { self.sets.len() } else { 0 };
-        (0..sets).flat_map(|set| self.nights_of(set)).collect()
+        let is_known = |set: &usize| self.night_jitters_kms.get(*set).is_some_and(Option::is_some);
+        (0..self.sets.len()).filter(|set| !is_known(set)).flat_map(|set| self.nights_of(set)).collect()
     }
 
     /// The same with drifts of the velocities: that of all profiles whose offsets are known, and one of each data set
@@ -299,7 +300,7 @@ impl Imager {
 
     /// Whether any velocities are integrated out beside those of single profiles.
     pub fn has_shared_velocities(&self) -> bool {
-        self.has_common_velocities() || !self.night_jitters_kms.is_empty()
+        self.has_common_velocities() || self.night_jitters_kms.iter().flatten().any(|sd_kms| *sd_kms > 0.0)
     }
 
     /// Number of each profile's data set, from 1; empty where there is only one.
@@ -355,12 +356,12 @@ impl Imager {
         let mut drifts = self.drifts.clone();
         drifts.retain(|drift| drift.set.is_none_or(|set| is_left(&sets[set])));
         drifts.iter_mut().for_each(|drift| drift.set = drift.set.map(place));
-        let of_left = |numbers: &[f64]| {
-            let kept = numbers.iter().zip(&sets).filter(|(_, set)| is_left(set));
-            kept.map(|(number, _)| *number).collect::<Vec<f64>>()
-        };
-        let jitter_shares = of_left(&self.jitter_shares);
-        let night_jitters_kms = of_left(&self.night_jitters_kms);
+        fn of_left<T: Copy>(numbers: &[T], sets: &[Seen], is_left: impl Fn(&Seen) -> bool) -> Vec<T> {
+            let kept = numbers.iter().zip(sets).filter(|(_, set)| is_left(set));
+            kept.map(|(number, _)| *number).collect()
+        }
+        let jitter_shares = of_left(&self.jitter_shares, &sets, is_left);
+        let night_jitters_kms = of_left(&self.night_jitters_kms, &sets, is_left);
         sets.retain(is_left);
         let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
         Imager {

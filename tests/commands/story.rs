@@ -159,7 +159,8 @@ fn by_hand_offsets_between_spectrographs() {
         let [value, sigma] = ["value_kms", "sigma_kms"].map(|key| number(&offset[key]));
         let pull = (value - OFFSET_KMS) / sigma;
         println!(
-            "| {seed} | {} | {:.1e} | {value:.3} +- {sigma:.3} | {pull:+.2} | {:.3} +- {:.3} | {:.2} +- {:.2} | {:.0} |",
+            "| {seed} | {} | {:.1e} | {value:.3} +- {sigma:.3} | {pull:+.2} | {:.3} +- {:.3} | {:.2} +- {:.2} | \
+            {:.0} |",
             verdict["finding"].as_str().unwrap(),
             number(&verdict["false_alarm_probability"]),
             number(&best["k_kms"]),

@@ -221,7 +221,8 @@ fn all_but_the_command_line_are_silent() {
     hold(faults);
 }
 
-/// What is found by a cell's own `get_or_init` holds the cell meanwhile: jobs within that ask for it wait for themselves.
+/// What is found by a cell's own `get_or_init` holds the cell meanwhile: jobs within it that ask for it wait for
+/// themselves.
 #[test]
 fn what_is_found_once_holds_no_cell() {
     let mut faults = Vec::new();

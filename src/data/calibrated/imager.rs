@@ -70,7 +70,7 @@ pub fn imager(
     if sets.iter().any(|set| set.jitter_share != 1.0) {
         imager.jitter_shares = sets.iter().map(|set| set.jitter_share).collect();
     }
-    if sets.iter().any(|set| set.night_jitter_kms > 0.0) {
+    if sets.iter().any(|set| set.night_jitter_kms.is_some()) {
         imager.night_jitters_kms = sets.iter().map(|set| set.night_jitter_kms).collect();
     }
     Ok(match settings.drift {

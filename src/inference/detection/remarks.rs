@@ -1,7 +1,7 @@
 //! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the
 //! verdict.
 
-use super::{Detection, DetectionSettings, KnownPlanet, Robustness};
+use super::{Detection, DetectionSettings, KnownPlanet, Robustness, WithoutNight};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::nights::NightOffsets;
@@ -24,6 +24,9 @@ const NEGATIVE: f64 = 2.0;
 
 /// Other peaks that may be the true one, as many as are named.
 const RIVALS_NAMED: usize = 3;
+
+/// Nights on which a signal depends, as many as are named.
+const NIGHTS_NAMED: usize = 3;
 
 /// What a search is judged by beside itself.
 #[derive(Clone, Copy, Debug)]
@@ -83,18 +86,6 @@ impl Detection {
         let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         remarks.extend(self.of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
-        if let Some(nights) = self.nights.filter(|nights| nights.false_alarm_probability > CANDIDATE_FAP) {
-            let NightOffsets { sigma_kms, false_alarm_probability, .. } = nights;
-            remarks.push(Remark::against(
-                "RV offsets of nights explain it as well",
-                format!(
-                    "RV offsets of {:.0} m/s from night to night explain the signal as well: FAP = {:.0} % beside them. \
-                    If those of the spectrograph are known, give observations.night_jitter_kms.",
-                    1000.0 * sigma_kms,
-                    100.0 * false_alarm_probability
-                ),
-            ));
-        }
         if self.highest().on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",
@@ -281,18 +272,35 @@ impl Detection {
                 ),
             ));
         }
-        let decisive = robustness.decisive_nights(level);
-        if let Some(night) = decisive.first() {
-            let (short, which) = match decisive.len() {
-                1 => {
-                    let which = format!("the night of {:.2} ({} profiles)", night.span_d.0, night.profiles);
-                    ("driven by a single night", which)
-                }
-                all => ("driven by few nights", format!("each of {all} nights of {}", robustness.nights.len())),
-            };
-            let text = format!("The signal depends on {which}: see the leave-one-night-out K.");
-            remarks.push(Remark::against(short, text));
+        remarks.extend(decided(&robustness.decisive_nights(level)));
+        let beside = robustness.night_offsets.filter(|beside| beside.false_alarm_probability > CANDIDATE_FAP);
+        if let Some(NightOffsets { sigma_kms, false_alarm_probability, .. }) = beside {
+            remarks.push(Remark::against(
+                "not significant beside RV offsets of nights",
+                format!(
+                    "Beside RV offsets of {:.0} m/s from night to night the signal is not significant: FAP = {:.1} %. \
+                    If the spectrograph's are known, set observations.night_jitter_kms.",
+                    1000.0 * sigma_kms,
+                    100.0 * false_alarm_probability
+                ),
+            ));
         }
         remarks
     }
+}
+
+/// That a signal depends on these nights, each by itself.
+fn decided(nights: &[&WithoutNight]) -> Option<Remark> {
+    let name = |night: &&WithoutNight| {
+        let profiles = if night.profiles == 1 { "profile" } else { "profiles" };
+        format!("{:.2} ({} {profiles})", night.span_d.0, night.profiles)
+    };
+    let named: Vec<String> = nights.iter().take(NIGHTS_NAMED).map(name).collect();
+    let (short, which) = match nights.len() {
+        0 => return None,
+        1 => ("driven by a single night", format!("the night of {}", named[0])),
+        all if all > NIGHTS_NAMED => ("driven by single nights", format!("each of {all} nights")),
+        _ => ("driven by single nights", format!("each of the nights of {}", named.join(", "))),
+    };
+    Some(Remark::against(short, format!("The signal depends on {which}: see the leave-one-night-out K.")))
 }

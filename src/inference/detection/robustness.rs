@@ -6,12 +6,13 @@
 
 use super::{Detection, DetectionSettings, KnownPlanet};
 use crate::model::{Parameter, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Jitters, Peak, orbits};
+use crate::planets::periodogram::nights::{NightOffsets, night_offsets};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Peak, SearchSettings, orbits};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::star::observation::{NIGHT_GAP_D, nights};
 use crate::surface::imaging::Imager;
-use crate::surface::{At, AtTarget};
+use crate::surface::{At, AtTarget, WithoutJitter};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -58,6 +59,8 @@ pub struct Robustness {
     pub targets: Vec<AtTarget>,
     /// Without each night, in order of time; empty if the profiles are of one night, or too few.
     pub nights: Vec<WithoutNight>,
+    /// What RV offsets of nights make of the highest peak, where it is a candidate beside a fitted jitter.
+    pub night_offsets: Option<NightOffsets>,
 }
 
 /// The orbit that is tried out.
@@ -162,7 +165,19 @@ pub fn robustness(
             delta_ln_p,
         }
     });
-    Robustness { all, targets, nights: without.collect() }
+    let night_offsets = match tried {
+        Tried::Peak(_) if found.is_candidate() => beside_night_offsets(imager, settings.search, found),
+        _ => None,
+    };
+    Robustness { all, targets, nights: without.collect(), night_offsets }
+}
+
+/// What RV offsets of nights make of the highest peak of the blind search.
+fn beside_night_offsets(imager: &Imager, settings: SearchSettings, found: &Detection) -> Option<NightOffsets> {
+    let WithoutJitter { here, found_kms, scale_kms } = found.without_jitter.as_ref()?;
+    let velocities = found.known.beside(&here.quadratic);
+    let at = (1.0 / found.blind.best().porb_over_prot, &found.frequencies);
+    night_offsets(&velocities, &imager.nights_of_sets(), (*found_kms, *scale_kms), at, settings)
 }
 
 /// An orbit with the Delta ln L of another.
@@ -231,7 +246,8 @@ mod tests {
             night(orbit(0.27, 0.0225, 15.0)),
             night(None),
         ];
-        let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets: vec![at(0.205), at(0.2), at(0.192)], nights };
+        let targets = vec![at(0.205), at(0.2), at(0.192)];
+        let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets, nights, night_offsets: None };
         assert_eq!(steady.held_out(), Some(HeldOut { delta_ln_p: 4.0, sigma_delta_ln_p: 0.0, nights: 4 }));
         assert_eq!(steady.target_matters(), None);
         let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();

@@ -43,6 +43,8 @@ pub struct Level {
     /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
     pub(super) constant: f64,
     pub(super) squares: DVector<f64>,
+    /// From deviates to these amplitudes, where they are not along the eigenvectors of I.
+    pub(super) rotation: Option<DMatrix<f64>>,
 }
 
 /// A trial period with the size of the jitter that suits its orbit best.
@@ -74,6 +76,7 @@ impl Jitters {
             root: root(&quadratic.information),
             constant: 0.0,
             squares: DVector::zeros(0),
+            rotation: None,
         };
         Jitters { levels: vec![level], rotation: DMatrix::zeros(0, 0) }
     }
@@ -103,6 +106,7 @@ impl Jitters {
                 root: among(sd.component_mul(&left)),
                 constant,
                 squares: left.component_mul(&sd.map(|sd| 0.5 * variance * sd * sd)),
+                rotation: None,
             }
         };
         let mut levels = SIZES.map(level).to_vec();
@@ -183,7 +187,7 @@ impl Jitters {
 
 /// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
 /// draws.
-fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let mut eigen = covariance.clone().symmetric_eigen();
     let still = STILL * eigen.eigenvalues.max();
     eigen.eigenvalues.apply(|variance| *variance = if *variance > still { variance.sqrt() } else { 0.0 });

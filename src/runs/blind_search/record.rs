@@ -442,10 +442,7 @@ impl PeriodogramFile {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),
             },
-            robustness: RobustnessRecord {
-                night_offsets: found.nights,
-                ..search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default()
-            },
+            robustness: search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default(),
             evidence: search.evidence.clone(),
             warnings: search.remarks.iter().map(|remark| remark.text.clone()).collect(),
             provenance: Provenance { measured: search.measured(), ..scene.provenance() },
@@ -545,7 +542,7 @@ impl RobustnessRecord {
         };
         RobustnessRecord {
             held_out_nights: found.held_out(),
-            night_offsets: None,
+            night_offsets: found.night_offsets,
             targets: found.targets.iter().map(target).collect(),
             without_night: found.nights.iter().map(night).collect(),
         }

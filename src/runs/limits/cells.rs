@@ -72,6 +72,10 @@ pub fn recovered(searches: &Searches, orbits: &Orbits, progress: &(dyn Fn(usize)
         };
         orbits.k_kms.iter().map(cell).collect::<Vec<_>>()
     };
+    // the level of a detection without an orbit, before all threads ask for it
+    if let (Some(porb_over_prot), Some(k_kms)) = (orbits.porb_over_prot.first(), orbits.k_kms.first()) {
+        searches.of_period(*porb_over_prot)(*k_kms, 0.0);
+    }
     orbits.porb_over_prot.par_iter().flat_map_iter(column).collect()
 }
 

@@ -44,7 +44,7 @@ pub struct DataSetSettings {
     /// Its RV jitter over the largest of all sets.
     pub jitter_share: f64,
     /// Standard deviation of the RV offsets of nights (km/s).
-    pub night_jitter_kms: f64,
+    pub night_jitter_kms: Option<f64>,
     /// Velocity that all profiles have too much.
     pub zero_point: ZeroPoint,
     /// Exposure time (s) of profiles whose own is not known.
@@ -130,9 +130,9 @@ pub(super) fn resolve_sets(
             };
             return Err(Fault::new(format!("{key}.contrast"), problem));
         }
-        let night_jitter_kms = section.night_jitter_kms.unwrap_or(0.0);
-        check_jitter(&format!("{key}.night_jitter_kms"), night_jitter_kms)?;
-        if night_jitter_kms > 0.0 && !has_field {
+        let night_jitter_kms = section.night_jitter_kms;
+        check_jitter(&format!("{key}.night_jitter_kms"), night_jitter_kms.unwrap_or(0.0))?;
+        if night_jitter_kms.is_some_and(|kms| kms > 0.0) && !has_field {
             let problem = "no effect but with imaging.objective \"marginal-likelihood\"";
             return Err(Fault::new(format!("{key}.night_jitter_kms"), problem));
         }
