@@ -46,7 +46,7 @@ pub struct NightOffsets {
 
 /// What offsets of `nights` make of the peak at one of the `frequencies` (orbits a rotation cycle), beside a jitter
 /// which is `found_kms` without a planet and has a prior of that scale; the offsets have the same prior, or that of
-/// [`USUAL_KMS`]. `None` where the profiles do not tell the offsets from a jitter, show none, or no orbit is bounded.
+/// 30 m/s. `None` where the profiles do not tell the offsets from a jitter, show none, or no orbit is bounded.
 pub fn night_offsets(
     without: &VelocityQuadratic,
     nights: &[Vec<usize>],
