@@ -179,7 +179,7 @@ def planets_found(planets, without):
         if group:
             hits = [row for row in group if row["false_alarm"] < calibration_table.FOUND]
             right = sum(map(is_right, hits))
-            ambiguous = sum(row["true_share"] > 0 for row in hits) - right
+            ambiguous = sum(row["true_share"] > 0 and not is_right(row) for row in hits)
             alike = group + [row for row in without if name in ("all", "one per seed", row["effect"])]
             sigma = f"{1000 * median(row['median_sigma_k_kms'] for row in alike):.1f}"
             ratio = f"{median(ratios(alike, plain)):.2f}"
