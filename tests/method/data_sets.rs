@@ -196,4 +196,11 @@ fn a_zero_point_that_is_not_known_is_found_and_held() {
     assert_eq!((second.sets.len(), second.zero_points[0].set), (1, 0));
     assert_eq!(both.imager.without(&[3, 9]).sets[0].sampling.profiles.len(), 7);
     assert_eq!(both.settings.values[Parameter::K], 0.15);
+    // nights of unknown offsets; 0 is known
+    assert_eq!(both.imager.nights_of_sets().concat().len(), 16);
+    let mut known = both.imager.clone();
+    known.night_jitters_kms = vec![Some(0.0), None];
+    let mut nights = known.nights_of_sets().concat();
+    nights.sort_unstable();
+    assert!(nights.into_iter().eq(8..16));
 }

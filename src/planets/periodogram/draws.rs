@@ -32,12 +32,9 @@ pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -
         if jitters.is_none() {
             return highest(&rows[0], &deviates);
         }
-        let squares_along = |rotation: &DMatrix<f64>| (rotation * &deviates).map(|amplitude| amplitude * amplitude);
-        let squares = squares_along(&jitters.rotation);
         let (mut without, mut with) = (vec![f64::NEG_INFINITY; size], vec![f64::NEG_INFINITY; size]);
         for (level, rows) in jitters.levels.iter().zip(&rows) {
-            let own = level.rotation.as_ref().map(squares_along);
-            let squares = own.as_ref().unwrap_or(&squares);
+            let squares = (&level.rotation * &deviates).map(|amplitude| amplitude * amplitude);
             for (k, highest) in highest(rows, &deviates).into_iter().enumerate() {
                 let alone = level.constant + level.squares.dot(&squares.column(k));
                 without[k] = without[k].max(alone);

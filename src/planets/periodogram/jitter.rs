@@ -25,8 +25,6 @@ pub fn ln_prior(jitter_kms: f64, scale_kms: Option<f64>) -> f64 {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jitters {
     pub(super) levels: Vec<Level>,
-    /// From deviates to amplitudes along the eigenvectors of I; without rows where there is no jitter.
-    pub(super) rotation: DMatrix<f64>,
 }
 
 /// One size.
@@ -43,8 +41,8 @@ pub struct Level {
     /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
     pub(super) constant: f64,
     pub(super) squares: DVector<f64>,
-    /// From deviates to these amplitudes, where they are not along the eigenvectors of I.
-    pub(super) rotation: Option<DMatrix<f64>>,
+    /// From deviates to these amplitudes; without rows where there is no jitter.
+    pub(super) rotation: DMatrix<f64>,
 }
 
 /// A trial period with the size of the jitter that suits its orbit best.
@@ -76,9 +74,9 @@ impl Jitters {
             root: root(&quadratic.information),
             constant: 0.0,
             squares: DVector::zeros(0),
-            rotation: None,
+            rotation: DMatrix::zeros(0, 0),
         };
-        Jitters { levels: vec![level], rotation: DMatrix::zeros(0, 0) }
+        Jitters { levels: vec![level] }
     }
 
     /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet, with the
@@ -106,13 +104,13 @@ impl Jitters {
                 root: among(sd.component_mul(&left)),
                 constant,
                 squares: left.component_mul(&sd.map(|sd| 0.5 * variance * sd * sd)),
-                rotation: None,
+                rotation: u.transpose(),
             }
         };
         let mut levels = SIZES.map(level).to_vec();
         let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
         levels.iter_mut().for_each(|level| level.ln_l -= best);
-        Jitters { levels, rotation: u.transpose() }
+        Jitters { levels }
     }
 
     /// ln L of no planet with each size, times its share of a prior that is uniform up to the largest.

@@ -164,7 +164,7 @@ impl Beside {
             root: root * kept.transpose(),
             constant: self.constant,
             squares: DVector::from_element(self.solved.nrows(), 0.5),
-            rotation: Some(&self.solved * root),
+            rotation: &self.solved * root,
         }
     }
 }
@@ -175,7 +175,7 @@ fn of_scatters(without: &VelocityQuadratic, null: Beside, all: Vec<Beside>) -> J
     let root = root(&(&without.information + &moved * moved.transpose()));
     let best = all.iter().map(|beside| beside.height).fold(f64::NEG_INFINITY, f64::max);
     let levels = all.iter().map(|beside| beside.level(without, &root, best)).collect();
-    Jitters { levels, rotation: DMatrix::zeros(0, without.len()) }
+    Jitters { levels }
 }
 
 #[cfg(test)]
