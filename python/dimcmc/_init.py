@@ -38,6 +38,7 @@ def init(
     velocity_range: Sequence[float] | None = None,
     photometry: _File | Sequence[_File] = (),
     photometry_wavelength: float | Sequence[float] | None = None,
+    indicator: _File | Sequence[_File] = (),
     objective: Literal["marginal-likelihood", "spottedness"] | None = None,
     brightness: Literal["bright-and-dark", "spots"] | None = None,
     pixels: int | None = None,
@@ -83,6 +84,8 @@ def init(
         Light curves of the same weeks: tables of time, flux and its uncertainty.
     photometry_wavelength : float or sequence of float, optional
         Wavelength (nm) of each light curve.
+    indicator : str, path, or a list of these
+        Activity indicators: tables of time, value and its uncertainty.
     objective : {"marginal-likelihood", "spottedness"}, optional
         Likelihood of an orbit.
     brightness : {"bright-and-dark", "spots"}, optional
@@ -140,7 +143,8 @@ def init(
         if len(ends) != 2:
             raise ValueError(f"velocity_range: must be two velocities, not {len(ends)}")
         options += ["--velocity-range", *ends]
-    options += [f"--photometry={os.fspath(file)}" for file in _files(photometry)]
+    for name, files in (("photometry", photometry), ("indicator", indicator)):
+        options += [f"--{name}={os.fspath(file)}" for file in _files(files)]
     place = Path("star.json") if out is None else Path(out)
     options.append(f"--out={place.absolute() if out is None else place}")
     if force or out is None:

@@ -23,6 +23,7 @@ _TABLES = {
     "residuals": "profiles.csv",
     "changes": "profiles.csv",
     "lightcurve": "lightcurve.csv",
+    "indicators": "indicators.csv",
     "limits": "limits.csv",
     "plan": "plan.csv",
     "completeness": "completeness.csv",

@@ -50,7 +50,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         resolving_power: None,
         wavelength_nm: None,
     };
-    let place = Place { config, lists: vec![own], light_curves: Vec::new(), schema: args.output.schema() };
+    let (light_curves, indicators) = (Vec::new(), Vec::new());
+    let place = Place { config, lists: vec![own], light_curves, indicators, schema: args.output.schema() };
     let known = args.known.over(import.known.clone())?;
     let spinner = progress::bar(global, None, "first look, test fit");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));

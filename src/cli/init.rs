@@ -3,7 +3,7 @@
 use super::output::ConfigFile;
 use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console, progress};
-use crate::data::config::{ConfigError, Spectrograph};
+use crate::data::config::{ConfigError, IndicatorSection, Spectrograph};
 use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, LightCurve, List, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
@@ -40,6 +40,9 @@ pub struct Args {
     /// Wavelength (nm) of each light curve, separated by commas: about 790 for TESS, 640 for Kepler
     #[arg(long, value_name = "NM", value_delimiter = ',')]
     photometry_wavelength: Vec<f64>,
+    /// Activity indicator: a table of time, value and its uncertainty; repeat the option for several
+    #[arg(long, value_name = "FILE")]
+    indicator: Vec<PathBuf>,
     #[command(flatten)]
     output: ConfigFile,
     #[command(flatten)]
@@ -280,6 +283,7 @@ impl Args {
             self.output.spare(&lsd::files(list), None)?;
         }
         self.output.spare(&self.photometry, None)?;
+        self.output.spare(&self.indicator, None)?;
         let read = |list: &PathBuf| {
             std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))
         };
@@ -289,6 +293,7 @@ impl Args {
             config: self.output.path(),
             lists: self.lists(&bytes, &known)?,
             light_curves: self.light_curves(&known)?,
+            indicators: self.indicators(&known)?,
             schema: self.output.schema(),
         };
         propose(&place, &known, say).map_err(|error| self.known.failure(error, &lists[0]))
@@ -324,24 +329,50 @@ impl Args {
 
     /// The light curves.
     fn light_curves(&self, known: &Known) -> Result<Vec<LightCurve>, Failure> {
-        if !known.objective().properties().takes_light_curves && !self.photometry.is_empty() {
-            let problem = "--photometry: takes the objective \"marginal-likelihood\": leave --objective out";
-            return Err(Failure::input(problem));
+        if !known.objective().properties().takes_light_curves {
+            only_evolving("--photometry", &self.photometry)?;
         }
         let count = self.photometry.len();
         let wavelengths = KnownArgs::of_lists("--photometry-wavelength", &self.photometry_wavelength, count)?;
-        let mut found = Vec::new();
-        for (k, (path, given)) in self.photometry.iter().zip(wavelengths).enumerate() {
-            let name = plain(&path.file_stem().unwrap_or_default().to_string_lossy());
-            let unique = name.filter(|name| found.iter().all(|other: &LightCurve| other.name != *name));
-            found.push(LightCurve {
-                name: unique.unwrap_or_else(|| format!("photometry{}", k + 1)),
-                path_in_config: self.output.relative(path)?,
-                wavelength_nm: given.map(|given| given.value),
-            });
-        }
-        Ok(found)
+        let names = names_of_tables(&self.photometry, "photometry");
+        let tables = self.photometry.iter().zip(names).zip(wavelengths);
+        let curve = |((path, name), given): ((&PathBuf, String), Option<Given<f64>>)| {
+            let path_in_config = self.output.relative(path)?;
+            Ok(LightCurve { name, path_in_config, wavelength_nm: given.map(|given| given.value) })
+        };
+        tables.map(curve).collect()
     }
+
+    /// The activity indicators.
+    fn indicators(&self, known: &Known) -> Result<Vec<IndicatorSection>, Failure> {
+        if !known.objective().properties().has_field {
+            only_evolving("--indicator", &self.indicator)?;
+        }
+        let section = |(path, name): (&PathBuf, String)| {
+            Ok(IndicatorSection { name: Some(name), path: self.output.relative(path)?, exclude: Vec::new() })
+        };
+        self.indicator.iter().zip(names_of_tables(&self.indicator, "indicator")).map(section).collect()
+    }
+}
+
+/// That tables given by an option that needs evolving maps are none.
+fn only_evolving(option: &str, tables: &[PathBuf]) -> Result<(), Failure> {
+    if tables.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::input(format!("{option}: takes the objective \"marginal-likelihood\": leave --objective out")))
+}
+
+/// Names of tables: those of their files without what a name must not have; `otherwise` and a number where that is
+/// nothing, or the name of one before.
+fn names_of_tables(tables: &[PathBuf], otherwise: &str) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (k, path) in tables.iter().enumerate() {
+        let name = plain(&path.file_stem().unwrap_or_default().to_string_lossy());
+        let unique = name.filter(|name| !names.contains(name));
+        names.push(unique.unwrap_or_else(|| format!("{otherwise}{}", k + 1)));
+    }
+    names
 }
 
 /// Whether two paths are of one file.

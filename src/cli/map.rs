@@ -5,7 +5,7 @@ use super::report_lines::Report;
 use super::signals::{RESULT, Signals};
 use super::{Failure, Global, progress};
 use crate::data::config::Config;
-use crate::data::io::map::{FILES, LIGHT_CURVES};
+use crate::data::io::map;
 use crate::runs::maps::Maps;
 use std::path::PathBuf;
 
@@ -16,7 +16,8 @@ use std::path::PathBuf;
 /// the other objectives the map is static: the one of maximum entropy at `imaging.chi2_target`.
 ///
 /// Writes map.json, profiles.csv (observed and model profiles), rv.csv (RVs before and after removal of the spot
-/// signal) and fit.json (goodness of fit); with light curves (`photometry`) lightcurve.csv.
+/// signal) and fit.json (goodness of fit); with light curves (`photometry`) lightcurve.csv,
+/// with activity indicators that count indicators.csv.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {
@@ -34,7 +35,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let signals = Signals::catch(RESULT)?;
     args.output.check()?;
     let scene = scene(&Config::load(&args.config)?)?;
-    args.output.spare(&scene.files(), |name| FILES.contains(&name) || name == LIGHT_CURVES)?;
+    args.output.spare(&scene.files(), map::is_file)?;
     let scene = fitted(global, scene);
     let spinner = progress::bar(global, None, "reconstructing");
     let maps = Maps::of(&scene, args.times.as_deref(), &|what| spinner.set_message(what));

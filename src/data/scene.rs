@@ -144,9 +144,9 @@ impl Scene {
 
     /// The same with indicators as they were fitted.
     fn with_indicators(mut self, found: &[FittedIndicator]) -> Self {
-        let used = found.iter().zip(&self.indicators).filter(|(found, _)| found.is_used());
-        let of = |(found, values): (&FittedIndicator, &Vec<Flux>)| {
-            Indicator::new(&found.name, values, found.gain, found.jitter)
+        let used = found.iter().zip(&self.indicators).enumerate().filter(|(_, (found, _))| found.is_used());
+        let of = |(number, (found, values)): (usize, (&FittedIndicator, &Vec<Flux>))| {
+            Indicator::new((number, &found.name), values, found.gain, found.jitter)
         };
         self.imager.indicators = used.map(of).collect();
         self.measured.indicators = found.to_vec();

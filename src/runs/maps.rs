@@ -4,7 +4,7 @@
 use crate::data::calibrated::suspects;
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::atomic::WriteError;
-use crate::data::io::map::{FILES, LIGHT_CURVES, MapResult};
+use crate::data::io::map::{self, MapResult};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
 use crate::inference::detection::{KnownPlanets, PlanetFree};
@@ -99,11 +99,11 @@ impl<'a> Maps<'a> {
 
     /// Names of the files, in the order in which they are written.
     pub fn files(&self) -> Vec<&'static str> {
-        FILES.into_iter().chain((!self.maps.light.is_empty()).then_some(LIGHT_CURVES)).collect()
+        map::files(&self.maps)
     }
 
     /// Writes `map.json`, `profiles.csv`, `rv.csv` and `fit.json` into `folder`, which must exist; where there are
-    /// light curves `lightcurve.csv`, too.
+    /// light curves `lightcurve.csv`, too, and where indicators count `indicators.csv`.
     ///
     /// # Errors
     /// A file that cannot be written.

@@ -30,6 +30,10 @@ pub struct Scale {
 pub struct Indicator {
     /// Its name.
     pub name: String,
+    /// Its number among all that were given, from 0.
+    pub number: usize,
+    /// What its readings are counted from, and in.
+    pub scale: Scale,
     /// Its readings, in the order of time, with a jitter among their errors.
     pub readings: Vec<Reading>,
     /// Change of a reading by a filling factor of the visible disc of 1.
@@ -37,11 +41,11 @@ pub struct Indicator {
 }
 
 impl Indicator {
-    /// Of measurements in the order of time, with a gain and a jitter in their units.
-    pub fn new(name: &str, measured: &[Flux], gain: f64, jitter: f64) -> Self {
+    /// Of measurements in the order of time, with a gain and a jitter in their units; the one of that `number`.
+    pub fn new((number, name): (usize, &str), measured: &[Flux], gain: f64, jitter: f64) -> Self {
         let (scale, mut readings) = scaled(measured);
         readings.iter_mut().for_each(|reading| reading.sigma = reading.sigma.hypot(jitter / scale.rms));
-        Indicator { name: name.to_owned(), readings, gain: gain / scale.rms }
+        Indicator { name: name.to_owned(), number, scale, readings, gain: gain / scale.rms }
     }
 }
 

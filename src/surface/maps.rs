@@ -3,7 +3,7 @@
 //! judged.
 
 use super::checks::{Checks, Residual};
-use super::evolving_map::{FluxFit, NoFit};
+use super::evolving_map::{FluxFit, NoFit, ReadingFit};
 use super::imaging::Imager;
 use super::nuisances::LineAndContinuum;
 use super::static_map::ReferenceError;
@@ -35,6 +35,9 @@ pub struct SurfaceMaps {
     /// Light curves, and what the maps make of them; mostly none.
     #[doc(hidden)]
     pub light: Vec<FluxFit>,
+    /// Activity indicators that count, and what the maps make of them; mostly none.
+    #[doc(hidden)]
+    pub readings: Vec<ReadingFit>,
     /// Images of other chi2, in order of falling chi2, where there is a target.
     #[doc(hidden)]
     pub trade_off: Vec<TradeOffNode>,

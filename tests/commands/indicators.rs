@@ -61,6 +61,22 @@ fn an_indicator_from_its_table_to_a_map() {
     // it goes with the amplitude of the spots, which is held
     assert!((-0.6..-0.25).contains(&number(0, "gain")) && number(0, "ln_bayes") > 10.0, "{found}");
     assert_eq!(number(1, "gain"), 0.0);
+    // the one that counts is tabled with what the maps make of it, and drawn by its name
+    let table = desk.read("map/indicators.csv");
+    assert_eq!(table.lines().next(), Some("time_d,value,sigma,model,residual,indicator"));
+    let rows: Vec<Vec<f64>> =
+        table.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), count);
+    for (row, [t, v]) in rows.iter().zip(&values) {
+        assert!((row[0] - t).abs() < 1e-9 && (row[1] - v).abs() < 1e-9 && row[5] == 1.0, "{row:?} {t} {v}");
+        assert!((row[3] + row[4] - row[1]).abs() < 1e-12, "{row:?}");
+    }
+    let squares = |of: &dyn Fn(&Vec<f64>) -> f64| rows.iter().map(|row| of(row).powi(2)).sum::<f64>();
+    let mean = rows.iter().map(|row| row[1]).sum::<f64>() / count as f64;
+    assert!(squares(&|row| row[4]) < 0.2 * squares(&|row| row[1] - mean), "{table}");
+    assert!(squares(&|row| row[4] / row[2]) < 2.0 * count as f64, "{table}");
+    desk.succeed(&["plot", "map", "--out", "figures"]);
+    says(&desk.read("figures/indicators.svg"), &["halpha", "most probable maps", "residual"]);
     // a useless one by itself changes no byte of the maps
     let own = |indicators: Value, out: &str| {
         let mut config = with(indicators);
@@ -72,9 +88,36 @@ fn an_indicator_from_its_table_to_a_map() {
         (desk.read(&format!("{out}/profiles.csv")), desk.read(&format!("{out}/rv.csv")))
     };
     assert!(own(json!({ "path": "data/noise.txt" }), "noise") == own(Value::Null, "none"));
+    assert!(!desk.path("noise/indicators.csv").exists());
     // tables and what was found travel with an injected orbit
     desk.succeed(&["inject", "star.json", "--k-kms", "0.2", "--porb-over-prot", "1.7", "--phi", "0", "--out", "more"]);
     says(&desk.succeed(&["map", "more/config.json", "--out", "again"]), &["halpha: ", "gain -"]);
+}
+
+#[test]
+fn a_first_config_has_indicators_that_are_named() {
+    let (desk, values) = desk();
+    let rows: String = values.iter().map(|[t, v]| format!("{t},{v},0.001\n")).collect();
+    desk.write("data/h alpha.csv", &format!("time,value,sigma\n{rows}"));
+    std::fs::create_dir(desk.path("data/deep")).unwrap();
+    desk.write("data/deep/halpha.csv", &format!("time,value,sigma\n{rows}"));
+    let init = ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "60", "--pixels", "200"];
+    let first = ["--indicator", "data/h alpha.csv", "--indicator", "data/deep/halpha.csv"];
+    let said = desk.succeed(&[&init[..], &first, &["--out", "star.json"]].concat());
+    says(&said, &[&format!("note: indicator halpha: {} values, gain -", values.len()), "note: indicator indicator2: "]);
+    let found = &desk.json("star.json")["indicators"];
+    assert_eq!(
+        *found,
+        json!([{ "name": "halpha", "path": "data/h alpha.csv" },
+               { "name": "indicator2", "path": "data/deep/halpha.csv" }])
+    );
+    let refused = |more: &[&str], parts: &[&str]| says(&desk.refusal(&[&init[..], more].concat()), parts);
+    refused(&["--indicator", "absent.csv", "--out", "no.json"], &["absent.csv: cannot read"]);
+    refused(
+        &["--indicator", "data/deep/halpha.csv", "--objective", "spottedness", "--out", "no.json"],
+        &["--indicator: takes the objective \"marginal-likelihood\""],
+    );
+    refused(&[&first[..2], &["--out", "data/h alpha.csv", "--force"]].concat(), &["h alpha.csv"]);
 }
 
 #[test]

@@ -3,8 +3,8 @@
 
 use super::document::compact;
 use super::written::{
-    ImagingSettings, Instrument, Listed, ObservationsSection, PerParameter, PhotometrySection, Planet, PriorSection,
-    Star, VelocityJitter,
+    ImagingSettings, IndicatorSection, Instrument, Listed, ObservationsSection, PerParameter, PhotometrySection,
+    Planet, PriorSection, Star, VelocityJitter,
 };
 use crate::model::{Parameter, PriorKind};
 use serde::Serialize;
@@ -25,9 +25,21 @@ pub struct Draft {
     /// The light curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photometry: Option<Listed<PhotometrySection>>,
+    /// The activity indicators.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub indicators: Option<Listed<IndicatorSection>>,
     /// The image.
     pub imaging: ImagingSettings,
     parameters: PerParameter<PriorSection>,
+}
+
+/// What is beside the profiles.
+#[derive(Clone, Debug, Default)]
+pub struct Beside {
+    /// The light curves.
+    pub photometry: Vec<PhotometrySection>,
+    /// The activity indicators.
+    pub indicators: Vec<IndicatorSection>,
 }
 
 /// Where the orbit and the systemic velocity are looked for: from the first of each to the last, uniformly but for the
@@ -43,11 +55,12 @@ pub struct Sought {
 }
 
 impl Draft {
-    /// A draft of these sections; without a planet as its start, but for the period `porb_over_prot` it would have.
+    /// A draft of these sections, as yet without data sets; without a planet as its start, but for the period
+    /// `porb_over_prot` it would have.
     pub fn new(
         star: Star<Option<f64>>,
         instrument: Instrument,
-        (observations, photometry): (Vec<ObservationsSection>, Vec<PhotometrySection>),
+        Beside { photometry, indicators }: Beside,
         imaging: ImagingSettings,
         sought: Sought,
         porb_over_prot: f64,
@@ -59,10 +72,17 @@ impl Draft {
             (Parameter::Phi, periodic),
             (Parameter::Vsys, PriorSection::even(PriorKind::Uniform, sought.vsys_kms)),
         ]);
-        let observations = Listed::of(observations);
-        let photometry = (!photometry.is_empty()).then(|| Listed::of(photometry));
-        let planet = Planet::default();
-        let draft = Draft { schema: None, star, instrument, planet, observations, photometry, imaging, parameters };
+        let draft = Draft {
+            schema: None,
+            star,
+            instrument,
+            planet: Planet::default(),
+            observations: Listed::of(Vec::new()),
+            photometry: (!photometry.is_empty()).then(|| Listed::of(photometry)),
+            indicators: (!indicators.is_empty()).then(|| Listed::of(indicators)),
+            imaging,
+            parameters,
+        };
         draft.with_orbit((0.0, porb_over_prot, 0.0))
     }
 

@@ -16,7 +16,7 @@ mod written;
 
 pub use crate::sampling::ensemble::SamplerSettings;
 pub use document::{Config, from_json, to_text};
-pub use draft::{Draft, Sought};
+pub use draft::{Beside, Draft, Sought};
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use instruments::{SPECTROGRAPHS, Spectrograph};
@@ -25,10 +25,10 @@ pub use settings::{
     ObservationSource, Settings, too_long,
 };
 pub use written::{
-    Automatic, EquivalentWidth, EventWindows, Hyperparameter, ImagingSettings, Instrument, LimbDarkeningSection,
-    LimbLaw, Line, LineShape, Listed, ObservationsSection, OfField, OutlierTreatment, PhotometrySection, PlanSection,
-    SEGMENT_GAP_D, SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM, VelocityDrift, VelocityJitter,
-    ZeroPoint,
+    Automatic, EquivalentWidth, EventWindows, Hyperparameter, ImagingSettings, IndicatorSection, Instrument,
+    LimbDarkeningSection, LimbLaw, Line, LineShape, Listed, ObservationsSection, OfField, OutlierTreatment,
+    PhotometrySection, PlanSection, SEGMENT_GAP_D, SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM,
+    VelocityDrift, VelocityJitter, ZeroPoint,
 };
 
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.

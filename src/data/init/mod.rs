@@ -19,7 +19,7 @@ pub use ledger::{Entry, Source};
 pub use light::LightCurve;
 pub use proposal::{List, Place, Proposal, ProposalError};
 
-use crate::data::config::{ObservationsSection, ZeroPoint};
+use crate::data::config::{Beside, ObservationsSection, ZeroPoint};
 use crate::data::dataset::SceneError;
 use crate::data::io::lsd;
 use crate::data::io::lsd::ProfileSet;
@@ -50,8 +50,11 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let first = &mut first[0];
     first.values.join(&others.iter().map(|set| &set.values).collect::<Vec<_>>(), known, &mut first.ledger);
     let cuts: Vec<&Observations> = std::iter::once(&first.cut).chain(others.iter().map(|set| &set.cut)).collect();
-    let light = place.light_curves.iter().map(LightCurve::section).collect();
-    let mut draft = first.values.draft(&cuts, light, known, &mut first.ledger);
+    let beside = Beside {
+        photometry: place.light_curves.iter().map(LightCurve::section).collect(),
+        indicators: place.indicators.clone(),
+    };
+    let mut draft = first.values.draft(&cuts, beside, known, &mut first.ledger);
     let several = place.lists.len() > 1;
     let mut sections = Vec::new();
     for (s, (set, list)) in sets.iter_mut().zip(&place.lists).enumerate() {

@@ -3,7 +3,7 @@
 use super::known::Given;
 use super::ledger::{Entry, Source};
 use super::light::LightCurve;
-use crate::data::config::Draft;
+use crate::data::config::{Draft, IndicatorSection};
 use crate::data::dataset::SceneError;
 use crate::numerics::text::{Align, columns};
 use crate::surface::calibration::first_look::LookError;
@@ -18,6 +18,8 @@ pub struct Place<'a> {
     pub lists: Vec<List<'a>>,
     /// Light curves beside them.
     pub light_curves: Vec<LightCurve>,
+    /// Activity indicators, their tables relative to the config's folder.
+    pub indicators: Vec<IndicatorSection>,
     /// The JSON Schema as the config names it.
     pub schema: Option<String>,
 }

@@ -15,7 +15,7 @@ use crate::model::Parameter;
 use crate::star::BrightnessModel;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::star::MeasuredStar;
-use crate::surface::{NoMaps, OtherRotation, ReferenceError, SurfaceMaps};
+use crate::surface::{FittedIndicator, NoMaps, OtherRotation, ReferenceError, SurfaceMaps};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -57,6 +57,8 @@ pub(super) struct Trial {
     pub measured_vsini: bool,
     /// What was fitted of the star, and what it gains.
     pub star: Option<String>,
+    /// What activity indicators have to do with the spots.
+    pub indicators: Vec<String>,
     /// What has to be known of the maps.
     pub warnings: Vec<String>,
 }
@@ -162,6 +164,7 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
         trial.diagnosis = Diagnosis::at_sight(&scene).filter(|seen| seen.reason == Reason::DoubleLines);
     }
     trial.star = scene.measured.star.as_ref().map(MeasuredStar::line);
+    trial.indicators = scene.measured.indicators.iter().map(FittedIndicator::line).collect();
     // a second star makes another rotation period look better
     let is_double = trial.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.reason == Reason::DoubleLines);
     let rotation = scene.measured.other_rotation.as_ref().filter(|_| is_double).map(OtherRotation::sentence);
@@ -357,6 +360,7 @@ impl Trial {
             orbit: false,
             measured_vsini: false,
             star: None,
+            indicators: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -386,6 +390,7 @@ impl Trial {
             }
         };
         let star = self.star.as_ref().map(|star| format!("fitted star: {star}"));
-        vsini.into_iter().chain([ending]).chain(star).chain(self.warnings.iter().cloned()).collect()
+        let indicators = self.indicators.iter().map(|found| format!("indicator {found}"));
+        vsini.into_iter().chain([ending]).chain(star).chain(indicators).chain(self.warnings.iter().cloned()).collect()
     }
 }

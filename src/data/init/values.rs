@@ -5,8 +5,8 @@ use super::known::{Given, Known};
 use super::ledger::{Ledger, Source, origin};
 use super::line;
 use crate::data::config::{
-    Automatic, Draft, EquivalentWidth, FITTED, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line,
-    LineShape, ObservationsSection, PhotometrySection, Sought, Star, VelocityJitter,
+    Automatic, Beside, Draft, EquivalentWidth, FITTED, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw,
+    Line, LineShape, ObservationsSection, Sought, Star, VelocityJitter,
 };
 use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
@@ -131,13 +131,7 @@ impl Values {
     }
 
     /// The config's values, from the profiles of each data set within the velocity range.
-    pub fn draft(
-        &self,
-        cuts: &[&Observations],
-        light: Vec<PhotometrySection>,
-        known: &Known,
-        ledger: &mut Ledger,
-    ) -> Draft {
+    pub fn draft(&self, cuts: &[&Observations], beside: Beside, known: &Known, ledger: &mut Ledger) -> Draft {
         let look = &self.look;
         let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
         let rotation_period_d = self.rotation_period(known, ledger);
@@ -202,7 +196,7 @@ impl Values {
             given.value.to_owned()
         });
         let instrument = Instrument { name, resolving_power: Some(self.resolving_power), stability_ms: None };
-        Draft::new(star, instrument, (Vec::new(), light), imaging, sought, porb_over_prot)
+        Draft::new(star, instrument, beside, imaging, sought, porb_over_prot)
     }
 
     /// The profiles as a data set; with the nuisances of its own where it is one of several.

@@ -1,9 +1,9 @@
 //! The files of the maps of a star: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`; where there are light curves
-//! `lightcurve.csv`, too.
+//! `lightcurve.csv`, too, and where indicators count `indicators.csv`.
 
-mod light;
+mod beside;
 
-pub use light::LIGHT_CURVES;
+pub use beside::{INDICATORS, LIGHT_CURVES};
 
 use super::atomic::{WriteError, write, write_json, write_set};
 use super::csv::{DATA_SET, Table};
@@ -40,6 +40,16 @@ pub struct MapResult<'a> {
     pub diagnosis: Option<serde_json::Value>,
     /// Config, data and program.
     pub provenance: &'a Provenance,
+}
+
+/// Names of the files of these maps, in the order in which they are written.
+pub fn files(maps: &SurfaceMaps) -> Vec<&'static str> {
+    FILES.into_iter().chain(beside::tables(maps).into_iter().map(|(name, _)| name)).collect()
+}
+
+/// Whether a file of that name may be one of maps.
+pub fn is_file(name: &str) -> bool {
+    FILES.contains(&name) || [LIGHT_CURVES, INDICATORS].contains(&name)
 }
 
 /// Name of the map.
@@ -263,10 +273,9 @@ impl MapResult<'_> {
         write(&profiles, &self.profiles().into_bytes())?;
         write(&rv, &self.velocities().into_bytes())?;
         write_json(&fit, &self.fit())?;
-        match self.maps.light.is_empty() {
-            true => Ok(()),
-            false => write(&folder.join(LIGHT_CURVES), &light::table(&self.maps.light).into_bytes()),
-        }
+        beside::tables(self.maps)
+            .into_iter()
+            .try_for_each(|(name, table)| write(&folder.join(name), &table.into_bytes()))
     }
 
     fn map(&self) -> MapFile {

@@ -12,7 +12,6 @@ mod dynamic;
 mod ephemeris;
 mod injected;
 mod landscape;
-mod light;
 mod limits;
 mod maps;
 mod optimum;
@@ -21,6 +20,7 @@ mod periodogram;
 mod plan;
 mod profiles;
 mod projection;
+mod series;
 mod star_map;
 mod surface;
 mod survey;
@@ -38,7 +38,7 @@ pub use turning::turning;
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
-use crate::data::io::map::{LIGHT_CURVES, MAP, MapFile};
+use crate::data::io::map::{INDICATORS, LIGHT_CURVES, MAP, MapFile};
 use crate::data::io::{FileError, truth};
 use crate::figures::drawing::Figure;
 use crate::runs::origin::OriginError;
@@ -162,7 +162,10 @@ fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, Plot
         figures.push(velocities::of_map(folder)?);
     }
     if folder.join(LIGHT_CURVES).is_file() {
-        figures.push(light::figure(folder)?);
+        figures.push(series::light_curves(folder)?);
+    }
+    if folder.join(INDICATORS).is_file() {
+        figures.push(series::indicators(folder)?);
     }
     Ok(figures)
 }

@@ -47,7 +47,7 @@ impl Kind {
             Kind::Velocities => ("velocities", "Radial velocities"),
             Kind::Spectra => ("spectra", "Dynamic spectra"),
             Kind::Maps => ("maps", "Maps"),
-            Kind::LightCurves => ("light-curves", "Light curves"),
+            Kind::LightCurves => ("light-curves", "Light curves and indicators"),
             Kind::Periodogram => ("periodogram", "Periodogram"),
             Kind::Posterior => ("posterior", "Posterior"),
             Kind::Limits => ("limits", "Detection limits"),
@@ -90,7 +90,7 @@ impl Kind {
             "residuals" | "changes" => (Kind::Spectra, false),
             "profiles" => (Kind::Spectra, true),
             "map" | "maps" | "maps_mollweide" => (Kind::Maps, false),
-            "lightcurve" => (Kind::LightCurves, false),
+            "lightcurve" | "indicators" => (Kind::LightCurves, false),
             "periodogram" => (Kind::Periodogram, false),
             "corner" => (Kind::Posterior, false),
             "traces" | "autocorrelation" => (Kind::Posterior, true),
@@ -212,6 +212,7 @@ mod tests {
             ("maps_mollweide", Kind::Maps),
             ("periodogram_2", Kind::Periodogram),
             ("lightcurve", Kind::LightCurves),
+            ("indicators", Kind::LightCurves),
         ] {
             assert_eq!(Kind::of_figure(name), (kind, false), "{name}");
         }

@@ -12,6 +12,7 @@ use crate::model::Parameter;
 use crate::star::StarState;
 use crate::surface::expansion::stellar_step;
 use crate::surface::imaging::Imager;
+use crate::surface::indicator::{Indicator, Reading};
 use crate::surface::photometry::{FluxBin, LightCurve};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
@@ -38,6 +39,21 @@ pub struct FluxFit {
     /// The bin.
     pub bin: FluxBin,
     /// Flux of the most probable map, level and slope of the segment included.
+    pub model: f64,
+}
+
+/// A reading of an indicator and what the most probable maps make of it, in units of the indicator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadingFit {
+    /// Number of the indicator among all that were given, from 0.
+    pub indicator: usize,
+    /// Time (d).
+    pub time_d: f64,
+    /// The value.
+    pub value: f64,
+    /// Its standard error, jitter included.
+    pub sigma: f64,
+    /// The value by the most probable map, level and slope included.
     pub model: f64,
 }
 
@@ -179,9 +195,9 @@ impl Marginal {
         slopes
     }
 
-    /// The light curves as the most probable maps explain them, level and slope of each segment where they are most
-    /// probable given these maps.
-    pub fn light_curves(&self, imager: &Imager) -> Vec<FluxFit> {
+    /// What the most probable maps leave of each bin of the light curves and of each reading of the indicators, level
+    /// and slope of each segment and indicator where they are most probable given these maps.
+    fn beside_profiles(&self, imager: &Imager) -> Vec<f64> {
         let epochs = self.design.epochs(imager, &self.settled.coefficients);
         let of_light = &epochs[self.design.response().profiles()..];
         let numbers = of_light.first().map_or(0, |epoch| epoch.common.ncols());
@@ -192,13 +208,29 @@ impl Marginal {
         }
         // a sum of squares and 1 is positive definite
         let levels = inner.cholesky().map_or(DVector::zeros(numbers), |factor| factor.solve(&along));
+        of_light.iter().map(|epoch| epoch.misfit[0] - (&epoch.common * &levels)[0]).collect()
+    }
+
+    /// The light curves as the most probable maps explain them.
+    pub fn light_curves(&self, imager: &Imager) -> Vec<FluxFit> {
         let curves = imager.light_curves.iter().enumerate();
         let bins = curves.flat_map(|(c, curve)| curve.bins.iter().map(move |bin| (c, *bin)));
-        let fit = |((curve, bin), epoch): ((usize, FluxBin), &Epoch)| FluxFit {
-            curve,
-            bin,
-            model: bin.flux - epoch.misfit[0] + (&epoch.common * &levels)[0],
+        let fit =
+            |((curve, bin), residual): ((usize, FluxBin), f64)| FluxFit { curve, bin, model: bin.flux - residual };
+        bins.zip(self.beside_profiles(imager)).map(fit).collect()
+    }
+
+    /// The readings of the indicators that count as the most probable maps explain them.
+    pub fn readings(&self, imager: &Imager) -> Vec<ReadingFit> {
+        let bins = imager.light_curves.iter().map(|curve| curve.bins.len()).sum();
+        let all = imager.indicators.iter().flat_map(|one| one.readings.iter().map(move |reading| (one, reading)));
+        let fit = |((Indicator { number, scale, .. }, reading), residual): ((&Indicator, &Reading), f64)| ReadingFit {
+            indicator: *number,
+            time_d: reading.time_d,
+            value: scale.mean + scale.rms * reading.value,
+            sigma: scale.rms * reading.sigma,
+            model: scale.mean + scale.rms * (reading.value - residual),
         };
-        bins.zip(of_light).map(fit).collect()
+        all.zip(self.beside_profiles(imager).into_iter().skip(bins)).map(fit).collect()
     }
 }

@@ -49,7 +49,7 @@ pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
 pub use indicators::{FittedIndicator, fit_indicator};
 pub use known::{FieldStart, Known, LARGEST_AMPLITUDE};
-pub use light::{FluxFit, LEVEL};
+pub use light::{FluxFit, LEVEL, ReadingFit};
 pub use maps::Maps;
 pub use planned::Planned;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};

@@ -91,6 +91,7 @@ impl SurfaceMaps {
             nuisances: counted(nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect(),
             zero_points_kms: counted(marginal.assumed.jitter_kms > 0.0).map(|found| found.zero_point_kms).collect(),
             light,
+            readings: marginal.readings(imager),
             trade_off: Vec::new(),
             field: Some(SpotField::of(fitted)),
             model: modelled.intensities(),

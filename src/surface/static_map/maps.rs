@@ -78,6 +78,7 @@ impl SurfaceMaps {
             nuisances,
             zero_points_kms,
             light: Vec::new(),
+            readings: Vec::new(),
             trade_off: reference.tradeoff.nodes().iter().map(node).collect(),
             field: None,
             here: None,
