@@ -102,7 +102,7 @@ fn rows_of_the_likelihood_are_what_the_gain_was_found_by() {
     let (scale, readings) = scaled(&good);
     let ln_z = |gain: f64| {
         let mut with = scene.clone();
-        with.imager.indicators = vec![Indicator::new("halpha", &good, gain, 0.0)];
+        with.imager.indicators = vec![Indicator::new((0, "halpha"), &good, gain, 0.0)];
         assert_eq!(with.imager.epochs(), 8 + 25);
         marginal(&with, &basis, 12.0).ln_evidence()
     };
