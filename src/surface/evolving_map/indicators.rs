@@ -70,9 +70,10 @@ impl FittedIndicator {
             );
         }
         let digits = decimals(*sigma_gain);
+        let jitter = if *jitter > 0.0 { format!("{jitter:.2e}") } else { "0".to_owned() };
         format!(
             "{name}: {values} values, gain {gain:.digits$} ± {sigma_gain:.digits$} per filling factor \
-            (Δln Z = {ln_bayes:.1}), jitter {jitter:.2e}"
+            (Δln Z = {ln_bayes:.1}), jitter {jitter}"
         )
     }
 }
