@@ -155,7 +155,7 @@ fn a_plan_of_what_was_taken_is_its_search() {
         let all: Vec<usize> = (0..imager.times_of_all_d().len()).collect();
         assert_eq!(all.len() > imager.profiles().count(), light);
         let planned = Planned::new(imager, marginal.values, marginal.assumed, &free, Some((&marginal, &all)));
-        let plan = planned.velocities(&planned.drawn_maps(1).unwrap(), &[all]).unwrap().remove(0);
+        let plan = planned.velocities(&planned.drawn_maps(1).unwrap(), std::slice::from_ref(&all)).unwrap().remove(0);
         assert_eq!(plan.cycles, search.cycles);
         for (plan, search) in sigmas(&plan).into_iter().zip(sigmas(&search)) {
             assert!((plan / search - 1.0).abs() < 1e-2, "{plan} {search}");
