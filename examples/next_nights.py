@@ -8,10 +8,10 @@ Each star has 14 evolving spots, drawn as pixels by `dimcmc simulate`, and no pl
 follow, with one to four profiles each. `dimcmc plan --next 6` knows the profiles that are taken and the times of the
 others; it chooses for a planet of a period drawn for each star. Then the profiles of the nights it chose, of six evenly
 spaced and of six random ones are searched by `dimcmc periodogram` with those taken before, and sigma_K at that period
-is compared. With `--sets 2` nights are those of two spectrographs, the second with a lower resolution and S/N and an
-RV offset, and photometry goes on from the first night to the last. One line per star goes to
-results/calibration/next-nights.csv, or next-nights-sets.csv; the last command writes the tables at the end of
-results/plan.md.
+is compared. With `--sets 2` nights are those of two spectrographs (six each are taken, eight may follow), the second
+with a lower resolution and S/N and an RV offset, and photometry goes on from the first night to the last. One line per
+star goes to results/calibration/next-nights.csv, or next-nights-sets.csv; the last command writes the tables at the end
+of results/plan.md.
 """
 
 import json
@@ -28,7 +28,8 @@ TAKEN, CANDIDATES, CHOSEN = 8, 14, 6
 PERIODS_D = (3.0, 12.0)
 WAYS = ("chosen", "even", "random")
 NAMES = ("first", "second")
-LIGHT = {"cadence_d": 0.1, "sigma": 5e-4}
+OF_EACH = (6, 8)
+LIGHT = {"cadence_d": 0.2, "sigma": 5e-4}
 SETS_CSV = Path("results/calibration/next-nights-sets.csv")
 COLUMNS = "seed period_d forecast_now forecast chosen even random error".split()
 
@@ -58,6 +59,7 @@ def simulation(seed, sets):
     }
     if sets == 2:
         first = config["observations"] | {"name": NAMES[0]}
+        first["simulate"]["schedule"]["nights"] = sum(OF_EACH)
         other = {"snr": 800, "seed": 5000 + seed, "zero_point_kms": 0.15}
         simulate = first["simulate"] | other | {"velocity_kms": {"min": -45, "max": 45, "step": 2.5}}
         simulate["schedule"] = simulate["schedule"] | {"seed": 5000 + seed}
@@ -100,7 +102,8 @@ def one(seed, args):
             for text in rows(Path("data") / of / "observations.txt"):
                 nights.setdefault(math.floor(float(text.split()[1]) - FIRST_D), []).append(text)
             nights = [(s, nights[number]) for number in sorted(nights)]
-            taken, later = taken + nights[:TAKEN], later + nights[TAKEN:]
+            count = TAKEN if sets == 1 else OF_EACH[0]
+            taken, later = taken + nights[:count], later + nights[count:]
         later.sort(key=begin)
         known = ["--rotation-period", PROT_D, "--inclination", INCLINATION]
         if sets == 2:
