@@ -237,6 +237,24 @@ fn one_day_count(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigE
     }
 }
 
+/// Times (d) of a light curve from a first to a last time, one each `cadence_d`; `key` is the section that has it.
+///
+/// # Errors
+/// More than can be.
+pub fn at_cadence(
+    settings: &Settings,
+    key: &str,
+    cadence_d: f64,
+    [first, last]: [f64; 2],
+) -> Result<Vec<f64>, ConfigError> {
+    let count = ((last - first) / cadence_d).floor() + 1.0;
+    if count > MOST_SIMULATED {
+        let problem = format!("{cadence_d} makes {count} measurements, over {MOST_SIMULATED}");
+        return Err(settings.fault(&format!("{key}.cadence_d"), &problem));
+    }
+    Ok((0..count as usize).map(|k| first + k as f64 * cadence_d).collect())
+}
+
 /// The measurements of all light curves, read or simulated.
 fn light_curves(settings: &Settings) -> Result<Vec<Measurements>, SceneError> {
     let of = |curve: &LightCurveSettings| match &curve.source {
@@ -244,13 +262,8 @@ fn light_curves(settings: &Settings) -> Result<Vec<Measurements>, SceneError> {
         LightSource::Simulate(light) => {
             let simulations: Vec<&Simulation> = settings.sets.iter().filter_map(DataSetSettings::simulation).collect();
             let times = || simulations.iter().flat_map(|simulation| &simulation.times_d).copied();
-            let first = times().fold(f64::INFINITY, f64::min);
-            let count = ((times().fold(f64::NEG_INFINITY, f64::max) - first) / light.cadence_d).floor() + 1.0;
-            if count > MOST_SIMULATED {
-                let problem = format!("{} makes {count} measurements, over {MOST_SIMULATED}", light.cadence_d);
-                return Err(settings.fault(&format!("{}.simulate.cadence_d", curve.key), &problem).into());
-            }
-            let times_d: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * light.cadence_d).collect();
+            let ends = [times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)];
+            let times_d = at_cadence(settings, &format!("{}.simulate", curve.key), light.cadence_d, ends)?;
             let fluxes = simulations[0].fluxes(&settings.star, &curve.band, &times_d, (light.sigma, light.seed));
             Ok(Measurements { fluxes, ..Measurements::default() })
         }

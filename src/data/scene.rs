@@ -300,13 +300,22 @@ impl Scene {
                 *intensity = *shifted;
             }
         }
-        let Scene { settings, data, measured, chi2_target, imager, .. } = self;
-        let (measured, imager) = (measured.clone(), imager.clone());
+        self.with_parts(of_sets(&self.imager, &observations))
+    }
+
+    /// The same star with these profiles of each data set: all that was measured stays.
+    ///
+    /// # Errors
+    /// Profiles that make no sense.
+    #[doc(hidden)]
+    pub fn with_parts(&self, parts: Vec<Observations>) -> Result<Self, ConfigError> {
+        let Scene { settings, data, observations, measured, chi2_target, imager, .. } = self;
+        let (observations, measured, imager) = (observations.clone(), measured.clone(), imager.clone());
         let sha256 = self.data_sha256.clone();
         let (chi2_target, indicators) = (*chi2_target, self.indicators.clone());
         let before = Calibrated { observations, sha256, measured, chi2_target, imager, indicators };
         let Measured { star, drift_kms_d, sets, .. } = self.measured.clone();
-        let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings)?);
+        let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings, parts)?);
         let scene = scene.with_drift(&drift_kms_d).with_contrasts(&sets);
         Ok(match star {
             Some(star) => scene.with_star(star),

@@ -1,5 +1,6 @@
 //! Fields drawn at random: before the data, and after them.
 
+use super::epoch::in_common;
 use super::{Compression, Degrees, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
@@ -42,11 +43,15 @@ impl Evidence {
     ) -> Result<DMatrix<f64>, FieldError> {
         let all: Vec<f64> = self.numbers.times_d.iter().chain(times_d).copied().collect();
         let before = self.field.drawn(&self.degrees, &all, rng);
+        let common = DVector::from_fn(in_common(epochs), |_, _| rng.sample::<f64, _>(StandardNormal));
         let simulated = |(k, epoch): (usize, &Epoch)| {
             let mut normal = |n: usize| DVector::from_fn(n, |_, _| rng.sample::<f64, _>(StandardNormal));
             let noise = normal(epoch.len()).component_mul(&epoch.variance.map(f64::sqrt));
-            let misfit =
+            let mut misfit =
                 epoch.jacobian.times(before.column(k)) + noise + &epoch.nuisances * normal(epoch.nuisances.ncols());
+            if epoch.common.ncols() > 0 {
+                misfit += &epoch.common * &common;
+            }
             // these data are linear in the field
             Epoch { misfit, slopes: DMatrix::zeros(epoch.len(), 0), divisor: DVector::zeros(0), ..epoch.clone() }
         };
@@ -100,11 +105,11 @@ mod tests {
             nuisances: numbers.columns(4, 1).into_owned(),
             beside: 0.0,
             slopes: DMatrix::zeros(2, 0),
-            common: DMatrix::zeros(2, 0),
+            common: numbers.columns(5, 1).into_owned(),
             divisor: DVector::zeros(0),
         };
         let epochs: Vec<Epoch> =
-            [normal(2, 5), normal(2, 5), normal(2, 5)].into_iter().enumerate().map(epoch).collect();
+            [normal(2, 6), normal(2, 6), normal(2, 6)].into_iter().enumerate().map(epoch).collect();
         let how = Compression { left_out: 0.0 };
         let evidence = Evidence::new(field, &degrees, &epochs, &DMatrix::zeros(3, 3), how).unwrap();
         let times = [1.0, 4.0];

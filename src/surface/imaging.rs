@@ -303,6 +303,12 @@ impl Imager {
         self.has_common_velocities() || self.night_jitters_kms.iter().flatten().any(|sd_kms| *sd_kms > 0.0)
     }
 
+    /// Times (d) of all profiles, and then of all bins of light curves.
+    pub fn times_of_all_d(&self) -> Vec<f64> {
+        let of_bins = self.light_curves.iter().flat_map(|curve| &curve.bins).map(|bin| bin.time_d);
+        self.times_d().into_iter().chain(of_bins).collect()
+    }
+
     /// Number of each profile's data set, from 1; empty where there is only one.
     pub fn set_of_each(&self) -> Vec<usize> {
         let of_set = |(s, set): (usize, &Seen)| vec![s + 1; set.sampling.profiles.len()];

@@ -161,6 +161,82 @@ fn the_best_of_the_coming_nights_are_chosen() {
     says(&desk.refusal(&["plan", "config.json", "--next", "4", "--out", "d"]), &["planet", "--period-d"]);
 }
 
+/// Two spectrographs and a light curve: before the first night, and then from what has been taken.
+fn two_sets() -> Value {
+    let mut config = config(5);
+    let mut second = config["observations"].clone();
+    config["observations"]["name"] = json!("blue");
+    second["name"] = json!("red");
+    second["zero_point_kms"] = json!("fitted");
+    second["resolving_power"] = json!(40_000);
+    let simulate = second["simulate"].as_object_mut().unwrap();
+    simulate.remove("random_spots");
+    simulate.insert("seed".into(), json!(9));
+    simulate.insert("schedule".into(), json!({ "nights": 4, "per_night": [1, 3], "seed": 4 }));
+    simulate.insert("velocity_kms".into(), json!({ "min": -28, "max": 28, "step": 2.0 }));
+    config["observations"] = json!([config["observations"], second]);
+    config["imaging"]["pixels"] = json!(200);
+    config["photometry"] = json!({ "name": "tess", "simulate": { "cadence_d": 0.1, "sigma": 5e-4 } });
+    config
+}
+
+#[test]
+fn two_spectrographs_and_a_light_curve_are_planned() {
+    let desk = Desk::new(two_sets());
+    let said = plan(&desk, &["--out", "a"]);
+    says(&said, &["blue: 0 profiles taken, 10 of S/N 500 planned in 5 nights", "red: 0 profiles", "tess: "]);
+    let schedule = |out: &str| desk.json(&format!("{out}/plan.json"))["schedules"][0].clone();
+    let whole = |of: &Value| of["after"].as_array().unwrap().last().unwrap().clone();
+    let first = schedule("a");
+    assert_eq!((first["taken"].as_u64(), whole(&first)["nights"].as_u64()), (Some(0), Some(9)));
+    plan(&desk, &["--nights", "3", "--out", "fewer"]);
+    let fewer = whole(&schedule("fewer"));
+    assert_eq!(fewer["nights"].as_u64(), Some(6));
+    assert!(number(&fewer["k95_kms"]) > number(&whole(&first)["k95_kms"]));
+
+    // what has been taken, and what comes: by default of the last data set
+    let coming = json!({ "schedule": { "nights": 5, "per_night": [2, 2] } });
+    desk.set("/plan", coming.clone());
+    let said = plan(&desk, &["--next", "2", "--period-d", "4.9", "--out", "red"]);
+    says(&said, &["next nights", "data set", "fitted to the profiles there are"]);
+    let red = schedule("red");
+    let taken = red["sets"][1]["taken"].as_u64();
+    assert_eq!(red["sets"][1], json!({ "name": "red", "taken": taken, "planned": 10, "nights": 5, "snr": 500.0 }));
+    assert_eq!(red["sets"][0]["snr"], Value::Null);
+    assert_eq!(red["next"]["chosen"][0]["set"], "red");
+    // nights of either, and photometry beside those of one
+    let mut of_blue = coming.clone();
+    of_blue["set"] = json!("blue");
+    of_blue["snr"] = json!(900);
+    of_blue["photometry"] = json!({ "cadence_d": 0.1, "sigma": 5e-4 });
+    desk.set("/plan", json!([coming, of_blue]));
+    let said = plan(&desk, &["--next", "3", "--period-d", "4.9", "--out", "both"]);
+    says(&said, &["of S/N 900 planned in 5 nights", "plan[1].photometry: ", "3 of 10 nights"]);
+    let both = schedule("both");
+    assert_eq!(both["next"]["chosen"][0]["set"], "blue", "the better profiles");
+    assert_eq!(number(&both["next"]["now"]["sigma_k_kms"]), number(&red["next"]["now"]["sigma_k_kms"]));
+    desk.succeed(&["plot", "both"]);
+
+    let faulty = |key: &str, value: Value, parts: &[&str]| {
+        let mut config = two_sets();
+        config["plan"] = json!([{}, { "set": "blue" }]);
+        *config.pointer_mut(key).unwrap() = value;
+        says(&Desk::new(config).refusal(&["plan", "config.json", "--out", "a"]), parts);
+    };
+    faulty("/plan/1", json!({ "set": "green" }), &["config.json: plan[1].set: \"green\" is not there: blue, red"]);
+    let light = json!({ "photometry": { "name": "kepler", "cadence_d": 0.1, "sigma": 1e-3 } });
+    faulty("/plan/0", light, &["plan[0].photometry.name: \"kepler\"", "tess"]);
+    let light = json!({ "photometry": { "cadence_d": 0, "sigma": 1e-3 } });
+    faulty("/plan/0", light, &["plan[0].photometry.cadence_d"]);
+    faulty("/plan", json!([]), &["plan", "the list is empty"]);
+    // a light curve of another year
+    let desk = Desk::new(two_sets());
+    let rows: String = (0..50).map(|k| format!("{},1,0.001\n", 900.0 + 0.1 * f64::from(k))).collect();
+    desk.write("old.csv", &format!("time,flux,sigma\n{rows}"));
+    desk.set("/photometry", json!({ "path": "old.csv" }));
+    says(&desk.refusal(&["plan", "config.json", "--out", "a"]), &["photometry: its times", "one time system"]);
+}
+
 /// From a place nights are as long as the star is up, and a star that is not is refused.
 #[test]
 fn a_place_says_when_a_star_is_up() {

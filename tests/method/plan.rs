@@ -1,12 +1,18 @@
-//! The information of planned profiles against dense algebra with numerical derivatives.
+//! The information of planned profiles against dense algebra with numerical derivatives, and of those of several data
+//! sets and light curves against a search.
 
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::model::Parameter;
+use dimcmc::internals::planets::periodogram::Trial;
+use dimcmc::internals::planets::periodogram::orbits::scan;
+use dimcmc::internals::planets::velocities::VelocityQuadratic;
 use dimcmc::internals::surface::MEAN_FILLING;
-use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Planned};
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Planned, fit};
+use dimcmc::internals::surface::expansion::nuisances;
 use dimcmc::{Config, Scene};
 use nalgebra::{DMatrix, DVector};
-use serde_json::json;
+use serde_json::{Value, json};
+use std::sync::Arc;
 
 const SIGMA: f64 = 1.0 / 300.0;
 
@@ -96,4 +102,107 @@ fn dense(scene: &Scene, field: &Field, jitter_kms: f64, maps: &DMatrix<f64>, par
             },
         );
     columns.tr_mul(&covariance.cholesky().unwrap().solve(&columns))
+}
+
+/// Profiles of two spectrographs, the offset of one of them fitted or known, and a light curve if there is one; fields
+/// and jitter known.
+fn of_sets(zero_point: Value, light: bool) -> Config {
+    let set = |name: &str, cycles: &[f64], step: f64, seed: u64| {
+        let velocity = json!({ "min": -30.0, "max": 30.0, "step": step });
+        json!({ "name": name, "velocity_jitter_kms": 0.02 * seed as f64, "simulate": {
+            "cycles": cycles, "velocity_kms": velocity, "snr": 300.0, "pixels": 500, "seed": seed
+        } })
+    };
+    let mut second = set("b", &[0.45, 1.1, 2.2, 2.9, 3.3], 3.0, 2);
+    second["zero_point_kms"] = zero_point;
+    second["resolving_power"] = json!(40_000.0);
+    let mut first = set("a", &[0.0, 0.31, 0.9, 1.4, 2.6, 3.7], 4.0, 1);
+    first["simulate"]["random_spots"] = json!({ "number": 8, "seed": 3 });
+    let field = json!({
+        "objective": "marginal-likelihood", "pixels": 150,
+        "spot_amplitude": 0.15, "spot_slope": 0.9, "spot_lifetime_d": 5.0
+    });
+    let config = Config::default()
+        .with("star", json!({ "rotation_period_d": 3.0, "inclination_deg": 50.0, "vsini_kms": 20.0, "contrast": 0.2 }))
+        .with("star.line", json!({ "sigma_kms": 4.0, "equivalent_width_kms": 6.0 }))
+        .with("observations", json!([first, second]))
+        .with("imaging", field)
+        .with("parameters.vsys_kms", json!({ "prior": "uniform", "min": -1.0, "max": 1.0 }))
+        .with("parameters.vsini_kms", json!({ "prior": "normal", "mean": 20.0, "sd": 0.5 }));
+    match light {
+        true => config.with("photometry.simulate", json!({ "cadence_d": 0.3, "sigma": 0.001 })),
+        false => config,
+    }
+}
+
+/// Standard errors of K, averaged over phases, at some frequencies (orbits a rotation).
+fn sigmas(quadratic: &VelocityQuadratic) -> Vec<f64> {
+    let sigma = |trial: &Trial| (0.5 * trial.information.try_inverse().unwrap().trace()).sqrt();
+    scan(quadratic, &[0.37, 0.61, 0.83, 1.39]).iter().map(sigma).collect()
+}
+
+/// What a plan of data that have been taken says of K is what a search of them does: offsets, jitters, resolution and
+/// bins of each set, the light curve, and the star's parameters are counted in the same way.
+#[test]
+fn a_plan_of_what_was_taken_is_its_search() {
+    for (zero_point, light) in [(json!("fitted"), true), (json!(0.1), true), (json!("fitted"), false)] {
+        let scene = Scene::new(&of_sets(zero_point, light)).unwrap();
+        let imager = &scene.imager;
+        let free = nuisances(&scene.settings.free);
+        let (values, known) = (scene.settings.values, scene.surface().field.unwrap());
+        let marginal = fit(imager, &Arc::new(Basis::new(&imager.grid)), values, known, None).unwrap().marginal;
+        let search = marginal.expansion(imager, &[Parameter::Vsini]).unwrap().velocities(&free);
+        let all: Vec<usize> = (0..imager.times_of_all_d().len()).collect();
+        assert_eq!(all.len() > imager.profiles().count(), light);
+        let planned = Planned::new(imager, marginal.values, marginal.assumed, &free, Some((&marginal, &all)));
+        let plan = planned.velocities(&planned.drawn_maps(1).unwrap(), std::slice::from_ref(&all)).unwrap().remove(0);
+        assert_eq!(plan.cycles, search.cycles);
+        for (plan, search) in sigmas(&plan).into_iter().zip(sigmas(&search)) {
+            assert!((plan / search - 1.0).abs() < 1e-2, "{plan} {search}");
+        }
+    }
+}
+
+/// A data set in two parts without a free offset is one; a free offset costs, and a light curve adds.
+#[test]
+fn offsets_cost_and_light_curves_add() {
+    let of = |config: &Config, part: Option<&[usize]>| {
+        let scene = Scene::new(config).unwrap();
+        let free = nuisances(&scene.settings.free);
+        let field = Field {
+            spectrum: Spectrum { amplitude: 0.15, slope: 0.9, break_degree: 0.0 },
+            kernel: Kernel::of(Lifetime::Days(5.0)),
+        };
+        let assumed = Assumed { field, jitter_kms: 0.04 };
+        let planned = Planned::new(&scene.imager, scene.settings.values, assumed, &free, None);
+        let all: Vec<usize> = (0..scene.imager.times_of_all_d().len()).collect();
+        let part = part.map_or(all, <[usize]>::to_vec);
+        sigmas(&planned.velocities(&planned.mean_maps(), &[part]).unwrap()[0])
+    };
+    let known = of(&of_sets(json!(0.0), false), None);
+    let lower = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| *a < b * (1.0 + 1e-9));
+    assert!(lower(&known, &of(&of_sets(json!("fitted"), false), None)));
+    let with_light = of_sets(json!(0.0), true);
+    assert!(lower(&of(&with_light, None), &known));
+    // without its bins it is none
+    let profiles: Vec<usize> = (0..11).collect();
+    let without = of(&with_light, Some(&profiles));
+    assert!(without.iter().zip(&known).all(|(a, b)| (a / b - 1.0).abs() < 1e-6), "{without:?} {known:?}");
+
+    let whole = of_sets(json!(0.0), false);
+    let [first, second] = [0, 1].map(|s| whole.get("observations").unwrap()[s].clone());
+    let join = |second: &Value| {
+        let mut all = [first.clone(), second.clone()];
+        let simulate = all[0]["simulate"].clone();
+        all[1] = json!({ "name": "b", "velocity_jitter_kms": 0.02, "simulate": simulate });
+        let cycles = |of: &Value| of["simulate"]["cycles"].as_array().unwrap().clone();
+        let (mut one, both) = (all[0].clone(), [cycles(&first), cycles(second)]);
+        one["simulate"]["cycles"] = both.concat().into();
+        all[1]["simulate"]["cycles"] = both[1].clone().into();
+        all[1]["simulate"]["seed"] = json!(7);
+        all[1]["simulate"].as_object_mut().unwrap().remove("random_spots");
+        [whole.clone().with("observations", one), whole.clone().with("observations", all.to_vec())]
+    };
+    let [one, two] = join(&second).map(|config| of(&config, None));
+    assert!(one.iter().zip(&two).all(|(a, b)| (a / b - 1.0).abs() < 1e-6), "{one:?} {two:?}");
 }

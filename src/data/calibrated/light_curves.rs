@@ -195,11 +195,10 @@ impl Binned {
     }
 }
 
-/// The fingerprint of the observations with that of the light curves, where there are any.
-pub(super) fn fingerprint(profiles: String, curves: &[Binned]) -> String {
-    let rows = |Binned { curve, .. }: &Binned| {
-        curve.bins.iter().map(|bin| [bin.time_d, bin.spread_d, bin.flux, bin.sigma]).collect()
-    };
+/// The fingerprint of profiles with that of light curves, where there are any.
+pub fn with_light_curves(profiles: String, curves: &[LightCurve]) -> String {
+    let rows =
+        |curve: &LightCurve| curve.bins.iter().map(|bin| [bin.time_d, bin.spread_d, bin.flux, bin.sigma]).collect();
     with_tables(profiles, &curves.iter().map(rows).collect::<Vec<Vec<_>>>())
 }
 

@@ -10,6 +10,7 @@ mod seasons;
 mod strength;
 
 pub use imager::imager;
+pub use light_curves::with_light_curves;
 pub use strength::star_for;
 
 use crate::data::config::{Automatic, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter};
@@ -22,7 +23,7 @@ use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::target;
 use crate::surface::calibration::target::ChosenTarget;
 use crate::surface::imaging::Imager;
-use crate::surface::photometry::Flux;
+use crate::surface::photometry::{Flux, LightCurve};
 use light_curves::Binned;
 use sha2::{Digest, Sha256};
 
@@ -102,18 +103,17 @@ impl Calibrated {
                 measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
             }
         }
-        let sha256 = indicators::fingerprint(light_curves::fingerprint(sha256, &light_curves), &indicators);
+        let sha256 = indicators::fingerprint(with_light_curves(sha256, &imager.light_curves), &indicators);
         let observations = Observations::joined(parts);
         Ok(Calibrated { observations, sha256, measured, chi2_target, imager, indicators })
     }
 
-    /// The same where the profiles are others than those that it was measured on, of the same star at the same times
-    /// and in the same bins: errors, target chi2, velocity jitter and velocity offsets of data sets are held.
+    /// The same with other profiles of each data set than those that it was measured on: target chi2, velocity jitter
+    /// and velocity offsets of data sets are held.
     ///
     /// # Errors
     /// Profiles that make no sense.
-    pub fn of_others(self, settings: &Settings) -> Result<Self, ConfigError> {
-        let parts = of_sets(&self.imager, &self.observations);
+    pub fn of_others(self, settings: &Settings, parts: Vec<Observations>) -> Result<Self, ConfigError> {
         let mut imager = imager(settings, &settings.sets, &parts, &self.measured.seasons)?;
         imager.light_curves = self.imager.light_curves;
         imager.indicators = self.imager.indicators;
@@ -124,8 +124,21 @@ impl Calibrated {
         let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
         let held = self.measured.sets.iter().filter_map(|set| set.zero_point);
         held.enumerate().for_each(|(z, held)| imager.move_zero_point(z, held.held_kms));
-        Ok(Calibrated { sha256: fingerprint(&self.observations), imager, ..self })
+        let observations = Observations::joined(parts);
+        Ok(Calibrated { sha256: fingerprint(&observations), observations, imager, ..self })
     }
+}
+
+/// The light curves of `data`, beside profiles of these `parts`.
+///
+/// # Errors
+/// One of which nothing is left, or that tells nothing of the spots of these profiles.
+pub fn light_curves(
+    settings: &Settings,
+    data: &Dataset,
+    parts: &[Observations],
+) -> Result<Vec<LightCurve>, ConfigError> {
+    light_curves::near(settings, parts, &light_curves::binned(settings, &data.light_curves)?)
 }
 
 /// The profiles of each data set that `imager` knows of.

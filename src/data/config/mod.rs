@@ -22,13 +22,13 @@ pub use identity::{Difference, first_difference, jitter_difference, section_diff
 pub use instruments::{SPECTROGRAPHS, Spectrograph};
 pub use settings::{
     DataSetSettings, FITTED, GridSettings, IndicatorSettings, LightCurveSettings, LightSource, MOST_NODES,
-    ObservationSource, Settings, too_long,
+    ObservationSource, PlannedProfiles, Settings, too_long,
 };
 pub use written::{
     Automatic, EquivalentWidth, EventWindows, Hyperparameter, ImagingSettings, IndicatorSection, Instrument,
     LimbDarkeningSection, LimbLaw, Line, LineShape, Listed, ObservationsSection, OfField, OutlierTreatment,
-    PhotometrySection, PlanSection, SEGMENT_GAP_D, SimulatedLight, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM,
-    VelocityDrift, VelocityJitter, ZeroPoint,
+    PhotometrySection, PlanSection, PlannedLight, SEGMENT_GAP_D, SimulatedLight, Star, USUAL_LIMB_DARKENING,
+    USUAL_WAVELENGTH_NM, VelocityDrift, VelocityJitter, ZeroPoint,
 };
 
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.

@@ -1,20 +1,28 @@
 //! A star with the times at which it is to be observed.
 
-use crate::data::calibrated::{fingerprint, imager};
-use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, Settings};
+use crate::data::calibrated::{fingerprint, imager, light_curves, of_sets, with_light_curves};
+use crate::data::config::{
+    Config, ConfigError, DataSetSettings, LightSource, ObservationSource, PlannedLight, PlannedProfiles, SEGMENT_GAP_D,
+    Settings,
+};
+use crate::data::dataset::{Dataset, ProfileSet, at_cadence};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::{Scene, SceneError};
 use crate::data::simulate::Site;
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
-use crate::model::{Parameter, ParameterValues};
+use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
+use crate::runs::fitted::fitted;
 use crate::star::observation::nights;
 use crate::star::observation::{Observations, Profile};
+use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::planned::{Assumed, Basis, Marginal, fit};
+use crate::surface::photometry::{Flux, LightCurve, bin_width_d};
+use crate::surface::planned::{Assumed, Basis, Marginal, Planned, fit};
 use crate::surface::{Known, NoFit};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,20 +41,41 @@ pub struct Campaign {
     pub name: String,
     /// The config, resolved.
     pub settings: Settings,
-    /// Star, times, bins and noise: profiles that have been taken, then those that are planned.
+    /// Star, times, bins and noise: of each data set profiles that have been taken, then those that are planned; light
+    /// curves likewise.
     pub imager: Imager,
-    /// The profiles that have been taken, spots integrated out.
+    /// What has been taken, spots integrated out.
     pub taken: Option<Arc<Marginal>>,
+    /// Numbers of what there is before the first night: profiles, and then bins of light curves, which are counted
+    /// after all profiles.
+    pub known: Vec<usize>,
     /// Spots before the data, jitter.
     pub assumed: Assumed,
     /// Where the spots are from.
     pub source: SpotsSource,
-    /// Planned profiles night by night.
+    /// Planned profiles night by night; a night of two data sets is a night of each.
     pub nights: Vec<Vec<usize>>,
+    /// The data sets, if there are several.
+    pub sets: Vec<SetRecord>,
     /// Median standard error of a planned bin.
     pub sigma: f64,
     /// Config, times and program.
     pub provenance: Provenance,
+}
+
+/// A data set among several.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetRecord {
+    /// Its name.
+    pub name: String,
+    /// Profiles that had been taken before.
+    pub taken: usize,
+    /// Profiles that are planned.
+    pub planned: usize,
+    /// In so many nights.
+    pub nights: usize,
+    /// Signal-to-noise ratio of a planned bin; null where none is planned.
+    pub snr: Option<f64>,
 }
 
 /// Where the spots that are integrated out are from.
@@ -104,10 +133,20 @@ impl From<ConfigError> for CampaignError {
     }
 }
 
-/// Profiles that have been taken.
+/// What has been taken.
 struct Taken {
-    observations: Observations,
+    scene: Scene,
     marginal: Arc<Marginal>,
+}
+
+/// What is planned for a data set.
+struct Ahead {
+    set: usize,
+    profiles: Vec<Profile>,
+    /// Numbers of them.
+    nights: Vec<Vec<usize>>,
+    /// What is measured meanwhile.
+    light: Option<LightCurve>,
 }
 
 impl Campaign {
@@ -124,20 +163,14 @@ impl Campaign {
             .with("imaging.season_gap_d", Value::Null)
             .with("imaging.seasons", json!([]));
         let settings = config.settings()?;
-        let [set] = &settings.sets[..] else {
-            return Err(own.fault("observations", "a list of data sets: give a single one").into());
-        };
-        if let Some(curve) = settings.light_curves.first() {
-            return Err(own.fault(&curve.key, "light curves are not planned: delete it").into());
-        }
         if let Some(indicator) = settings.indicators.first() {
             return Err(own.fault(&indicator.key, "activity indicators are not planned: delete it").into());
         }
-        let simulated = matches!(set.source, ObservationSource::Simulate(_));
-        let taken = match (&settings.plan, simulated) {
-            (None, true) => None,
-            (None, false) => return Err(own.fault("plan", "missing: when is the star to be observed next?").into()),
-            (Some(_), _) => Some(taken(config)?),
+        let simulated = matches!(settings.sets[0].source, ObservationSource::Simulate(_));
+        let taken = match (settings.plan.is_empty(), simulated) {
+            (true, true) => None,
+            (true, false) => return Err(own.fault("plan", "missing: when is the star to be observed next?").into()),
+            (false, _) => Some(taken(config)?),
         };
         let wanted: Vec<Option<usize>> = match nights {
             [] => vec![None],
@@ -153,59 +186,123 @@ impl Campaign {
         wanted: Option<usize>,
     ) -> Result<Self, CampaignError> {
         let settings = with_nights(config, wanted)?.settings()?;
-        let mut planned = match (&settings.sets[0].source, &settings.plan, taken) {
-            (_, Some(plan), Some(taken)) => next(plan, &taken.observations, own)?,
-            (ObservationSource::Simulate(simulation), ..) => {
-                let mut observations = simulation.observe(&settings.sets[0].star);
-                let inflation = simulation.correlated_bins.sqrt();
-                observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= inflation);
-                observations
+        let data = if taken.is_some() { None } else { Some(Dataset::read(&settings)?) };
+        let mut ahead: Vec<Ahead> = match (taken, &data) {
+            (Some(Taken { scene, .. }), _) => {
+                settings.plan.iter().map(|plan| next(plan, scene, own)).collect::<Result<_, _>>()?
             }
-            _ => unreachable!("observed profiles have a plan"),
+            (None, data) => data.iter().flat_map(|data| simulated(&settings, data)).collect(),
         };
-        let site = settings.plan.as_ref().and_then(|plan| plan.site.filter(|_| plan.times_d.is_none()));
-        let mut nights = nights_of(&planned.times_d(), site.as_ref());
-        if let Some(wanted) = wanted.filter(|_| schedule_of(config).is_none()) {
-            if wanted > nights.len() {
-                return Err(CampaignError::Nights { path: own.path.clone(), wanted, listed: nights.len() });
+        for (ahead, _) in ahead.iter_mut().zip(listed(config)).filter(|(_, is_listed)| *is_listed) {
+            let Some(wanted) = wanted else { continue };
+            if wanted > ahead.nights.len() {
+                return Err(CampaignError::Nights { path: own.path.clone(), wanted, listed: ahead.nights.len() });
             }
-            nights.truncate(wanted);
-            let kept: Vec<usize> = nights.iter().flatten().copied().collect();
-            planned.profiles = kept.iter().map(|k| planned.profiles[*k].clone()).collect();
-            nights = nights_of(&planned.times_d(), site.as_ref());
+            ahead.truncate(wanted);
         }
-        let before = taken.map_or(0, |taken| taken.observations.profiles.len());
-        nights.iter_mut().flatten().for_each(|k| *k += before);
-        let sigma = median(planned.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect());
-        let mut all = planned;
-        if let Some(taken) = taken {
-            all.profiles.splice(0..0, taken.observations.profiles.iter().cloned());
+        let mut parts = match taken {
+            Some(Taken { scene, .. }) => of_sets(&scene.imager, &scene.observations),
+            None => vec![Observations { profiles: Vec::new() }; settings.sets.len()],
+        };
+        let before: Vec<usize> = parts.iter().map(|part| part.profiles.len()).collect();
+        let mut nights: Vec<(usize, Vec<usize>)> = Vec::new();
+        for ahead in &ahead {
+            let part = &mut parts[ahead.set].profiles;
+            nights.extend(ahead.nights.iter().map(|night| (ahead.set, night.iter().map(|k| part.len() + k).collect())));
+            part.extend(ahead.profiles.iter().cloned());
         }
+        let (mut imager, settings) = match (taken, data) {
+            (Some(Taken { scene, .. }), _) => {
+                let scene = scene.with_parts(parts.clone())?;
+                (scene.imager, scene.settings)
+            }
+            (None, data) => {
+                let mut imager = imager(&settings, &settings.sets, &parts, &[])?;
+                let of = |data| light_curves(&settings, &data, &parts);
+                imager.light_curves = data.map(of).transpose()?.unwrap_or_default();
+                (imager, settings)
+            }
+        };
+        let places = imager.profiles_of_sets();
+        let times_d = imager.times_d();
+        nights.iter_mut().for_each(|(set, night)| night.iter_mut().for_each(|k| *k += places[*set].start));
+        nights.sort_by(|(_, a), (_, b)| times_d[a[0]].total_cmp(&times_d[b[0]]));
+        let mut known: Vec<usize> = places.iter().zip(&before).flat_map(|(of, n)| of.start..of.start + n).collect();
+        let mut bins = times_d.len()..usize::MAX;
+        for (curve, of) in imager.light_curves.iter().zip(&settings.light_curves) {
+            let own = bins.by_ref().take(curve.bins.len());
+            // one that is simulated beside profiles that are planned is planned, too
+            let is_known = taken.is_some() || matches!(of.source, LightSource::File(_));
+            known.extend(own.filter(|_| is_known));
+        }
+        imager.light_curves.extend(ahead.iter_mut().filter_map(|ahead| ahead.light.take()));
+        let sigma = |of: &mut dyn Iterator<Item = &Ahead>| {
+            let sigmas: Vec<f64> = of.flat_map(|ahead| &ahead.profiles).flat_map(|p| p.sigma.clone()).collect();
+            (!sigmas.is_empty()).then(|| median(sigmas))
+        };
+        let record = |(set, of): (usize, &DataSetSettings)| SetRecord {
+            name: of.name.clone(),
+            taken: before[set],
+            planned: places[set].len() - before[set],
+            nights: nights.iter().filter(|(of, _)| *of == set).count(),
+            snr: sigma(&mut ahead.iter().filter(|ahead| ahead.set == set)).map(f64::recip),
+        };
+        let sets = settings.sets.iter().enumerate().filter(|_| settings.sets.len() > 1).map(record).collect();
         let stem = own.path.file_stem().map_or("plan".into(), |stem| stem.to_string_lossy().into_owned());
-        let known = settings.known_field();
-        let source = match (taken, known.amplitude, known.slope, known.lifetime) {
+        let known_field = settings.known_field();
+        let source = match (taken, known_field.amplitude, known_field.slope, known_field.lifetime) {
             (Some(_), ..) => SpotsSource::Fitted,
             (None, Some(_), Some(_), Some(_)) => SpotsSource::Given,
             _ => SpotsSource::Usual,
         };
-        let assumed = taken.map_or_else(|| usual(known), |taken| taken.marginal.assumed);
+        let data_sha256 = with_light_curves(fingerprint(&Observations::joined(parts)), &imager.light_curves);
         Ok(Campaign {
             name: wanted.map_or(stem.clone(), |nights| format!("{stem}, {nights} nights")),
-            imager: imager(&settings, &settings.sets, std::slice::from_ref(&all), &[])?,
             taken: taken.map(|taken| Arc::clone(&taken.marginal)),
-            assumed,
+            assumed: taken.map_or_else(|| usual(known_field), |taken| taken.marginal.assumed),
+            known,
             source,
-            nights,
-            sigma,
+            sigma: sigma(&mut ahead.iter()).unwrap_or(f64::NAN),
+            sets,
+            nights: nights.into_iter().map(|(_, night)| night).collect(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),
-                data_sha256: fingerprint(&all),
+                data_sha256,
                 config_sha256: own.sha256.clone(),
                 config: own.resolved.clone(),
                 measured: Measured::default(),
             },
+            imager,
             settings,
         })
+    }
+
+    /// What profiles and light curves will say of velocities, these nuisances integrated out.
+    pub(super) fn planned<'a>(&'a self, nuisances: &'a [Nuisance]) -> Planned<'a> {
+        let taken = self.taken.as_deref().map(|taken| (taken, &self.known[..]));
+        Planned::new(&self.imager, self.settings.values, self.assumed, nuisances, taken)
+    }
+
+    /// The profiles among some epochs.
+    pub(super) fn profiles_of(&self, part: &[usize]) -> Vec<usize> {
+        let count = self.imager.profiles().count();
+        part.iter().copied().filter(|k| *k < count).collect()
+    }
+
+    /// The epochs there are after some nights, with light curves up to a time (d) that may be later.
+    pub(super) fn after(&self, nights: &[usize], light_until_d: f64) -> Vec<usize> {
+        let times_d = self.imager.times_of_all_d();
+        let taken = self.profiles_of(&self.known);
+        let bins = self.imager.profiles().count()..times_d.len();
+        let is_there = |k: &usize| self.known.contains(k) || times_d[*k] <= light_until_d;
+        let of_nights = nights.iter().flat_map(|night| &self.nights[*night]).copied();
+        taken.into_iter().chain(of_nights).chain(bins.filter(is_there)).collect()
+    }
+
+    /// Name of the data set of a night, if there are several.
+    pub(super) fn set_of(&self, night: usize) -> Option<&str> {
+        let is_its = |of: &Range<usize>| of.contains(&self.nights[night][0]);
+        Some(&self.sets.get(self.imager.profiles_of_sets().iter().position(is_its)?)?.name)
     }
 
     /// Number of profiles that have been taken.
@@ -229,15 +326,18 @@ impl Campaign {
         self.imager.profiles().fold([f64::INFINITY, f64::NEG_INFINITY], span)
     }
 
-    /// The profiles there are after some of the nights, `looks` times as the campaign grows; before the first night
-    /// too, if profiles have been taken.
+    /// The epochs there are after some of the nights, `looks` times as the campaign grows; before the first night too,
+    /// if profiles have been taken. Light curves that are planned grow with it.
     pub(super) fn looks(&self, looks: usize) -> Vec<(usize, Vec<usize>)> {
         let mut nights: Vec<usize> = (1..=looks).map(|k| (k * self.nights.len()).div_ceil(looks)).collect();
         if self.taken.is_some() {
             nights.insert(0, 0);
         }
         nights.dedup();
-        let part = |n: usize| (0..self.before()).chain(self.nights[..n].iter().flatten().copied()).collect();
+        let times_d = self.imager.times_d();
+        let last_d =
+            |n: usize| self.nights[..n].iter().flatten().map(|k| times_d[*k]).fold(f64::NEG_INFINITY, f64::max);
+        let part = |n: usize| self.after(&(0..n).collect::<Vec<_>>(), last_d(n));
         nights.into_iter().map(|n| (n, part(n))).collect()
     }
 
@@ -247,20 +347,59 @@ impl Campaign {
     /// [`FrequencyError`].
     pub(super) fn frequencies(&self, part: &[usize], wanted: FrequencySettings) -> Result<Frequencies, FrequencyError> {
         let all = self.imager.cycles();
-        let cycles: Vec<f64> = part.iter().map(|k| all[*k]).collect();
+        let cycles: Vec<f64> = self.profiles_of(part).iter().map(|k| all[*k]).collect();
         Frequencies::new(&cycles, self.imager.star.rotation_period_d, wanted)
     }
 }
 
 /// The config's observations with the field that fits them, without a planet.
 fn taken(config: &Config) -> Result<Taken, CampaignError> {
-    let scene = Scene::new(config)?;
+    let mut scene = Scene::new(config)?;
+    // a star observed with one spectrograph alone is as its config says
+    if scene.settings.sets.len() > 1 || !scene.settings.light_curves.is_empty() {
+        scene = fitted(scene, &|_| ());
+    }
     let known = scene.surface().field.unwrap_or_default();
-    let mut values: ParameterValues = scene.settings.values;
+    let mut values = scene.settings.values;
     values.set(Parameter::K, 0.0);
-    let fitted = fit(&scene.imager, &Arc::new(Basis::new(&scene.imager.grid)), values, known, None);
-    let fitted = fitted.map_err(|source| CampaignError::Field { path: scene.settings.path.clone(), source })?;
-    Ok(Taken { observations: scene.observations, marginal: Arc::new(fitted.marginal) })
+    let found = fit(&scene.imager, &Arc::new(Basis::new(&scene.imager.grid)), values, known, None);
+    let found = found.map_err(|source| CampaignError::Field { path: scene.settings.path.clone(), source })?;
+    Ok(Taken { scene, marginal: Arc::new(found.marginal) })
+}
+
+impl Ahead {
+    /// Of these profiles of a data set, taken from a place if one is known.
+    fn new(set: usize, profiles: Vec<Profile>, site: Option<&Site>) -> Self {
+        let times_d: Vec<f64> = profiles.iter().map(|profile| profile.time_d).collect();
+        let nights = match site {
+            None => nights(&times_d, NIGHT_GAP_D),
+            // from local noon to noon
+            Some(site) => {
+                let mut order: Vec<usize> = (0..times_d.len()).collect();
+                order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
+                let is_one = |a: &usize, b: &usize| site.night(times_d[*a]) == site.night(times_d[*b]);
+                order.chunk_by(is_one).map(<[usize]>::to_vec).collect()
+            }
+        };
+        Ahead { set, profiles, nights, light: None }
+    }
+
+    /// Leaves the first nights.
+    fn truncate(&mut self, nights: usize) {
+        let kept = self.nights[..nights].iter().flatten().map(|k| self.profiles[*k].clone());
+        *self = Ahead { light: self.light.take(), ..Ahead::new(self.set, kept.collect(), None) };
+    }
+}
+
+/// The profiles of each data set of a star that is not yet observed.
+fn simulated(settings: &Settings, data: &Dataset) -> Vec<Ahead> {
+    let of_set = |(set, (of, profiles)): (usize, (&DataSetSettings, &ProfileSet))| {
+        let inflation = of.simulation().map_or(1.0, |simulation| simulation.correlated_bins.sqrt());
+        let mut profiles = profiles.observations.profiles.clone();
+        profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= inflation);
+        Ahead::new(set, profiles, None)
+    };
+    settings.sets.iter().zip(&data.sets).enumerate().map(of_set).collect()
 }
 
 /// A usual field, but for what is known.
@@ -275,75 +414,105 @@ fn usual(known: Known) -> Assumed {
     Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms: known.jitter_kms.unwrap_or(0.0) }
 }
 
-/// Where the schedule is.
-fn schedule_of(config: &Config) -> Option<&'static str> {
-    const PLACES: [&str; 2] = ["plan.schedule", "observations.simulate.schedule"];
-    match config.get("plan") {
-        Some(plan) if plan.get("times_d").is_some_and(|times| !times.is_null()) => None,
-        Some(_) => Some(PLACES[0]),
-        None => config.get(PLACES[1]).map(|_| PLACES[1]),
+/// The part of the config that says when profiles are taken, and in which section of it.
+fn place(config: &Config) -> (&'static str, &'static str) {
+    match config.get("plan").is_some_and(|plan| !plan.is_null()) {
+        true => ("plan", ""),
+        false => ("observations", "/simulate"),
     }
 }
 
-/// The config with that many nights in its schedule, if it has one.
+/// Those sections, one for each data set.
+fn sections<'a>(part: &'a mut Value, inner: &str) -> Vec<&'a mut Value> {
+    let all = match part {
+        Value::Array(all) => all.iter_mut().collect(),
+        one => vec![one],
+    };
+    all.into_iter().filter_map(|section| section.pointer_mut(inner)).collect()
+}
+
+/// Whether a section lists times, rather than having a schedule.
+fn lists_times(section: &Value) -> bool {
+    ["times_d", "cycles"].iter().any(|key| section.get(key).is_some_and(|times| !times.is_null()))
+}
+
+/// Of which data sets times are listed.
+fn listed(config: &Config) -> Vec<bool> {
+    let (key, inner) = place(config);
+    let mut part = config.get(key).cloned().unwrap_or_default();
+    sections(&mut part, inner).iter().map(|section| lists_times(section)).collect()
+}
+
+/// The config with that many nights in its schedules.
 fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, CampaignError> {
-    let (Some(wanted), Some(schedule)) = (wanted, schedule_of(config)) else { return Ok(config.clone()) };
-    let listed = format!("{schedule}.on_nights");
-    match config.get(&listed).and_then(|value| value.as_array()) {
-        None => Ok(config.clone().with(&format!("{schedule}.nights"), wanted)),
-        Some(numbers) if wanted <= numbers.len() => Ok(config.clone().with(&listed, numbers[..wanted].to_vec())),
-        Some(numbers) => {
-            let path = config.settings()?.path;
-            Err(CampaignError::Nights { path, wanted, listed: numbers.len() })
+    let Some(wanted) = wanted else { return Ok(config.clone()) };
+    let (key, inner) = place(config);
+    let mut part = config.get(key).cloned().unwrap_or_default();
+    for section in sections(&mut part, inner).into_iter().filter(|section| !lists_times(section)) {
+        match section.pointer("/schedule/on_nights").and_then(Value::as_array) {
+            None => section["schedule"]["nights"] = wanted.into(),
+            Some(numbers) if wanted <= numbers.len() => {
+                section["schedule"]["on_nights"] = numbers[..wanted].to_vec().into();
+            }
+            Some(numbers) => {
+                let path = config.settings()?.path;
+                return Err(CampaignError::Nights { path, wanted, listed: numbers.len() });
+            }
         }
     }
+    Ok(config.clone().with(key, part))
 }
 
-/// Numbers of the profiles of each night: from local noon to noon at a place, or else as gaps tell.
-fn nights_of(times_d: &[f64], site: Option<&Site>) -> Vec<Vec<usize>> {
-    let Some(site) = site else { return nights(times_d, NIGHT_GAP_D) };
-    let mut order: Vec<usize> = (0..times_d.len()).collect();
-    order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
-    order.chunk_by(|a, b| site.night(times_d[*a]) == site.night(times_d[*b])).map(<[usize]>::to_vec).collect()
-}
-
-/// Planned profiles like those that have been taken: bins of the last of them, and a median error where no
-/// signal-to-noise ratio is planned.
-fn next(plan: &PlanSection, taken: &Observations, settings: &Settings) -> Result<Observations, ConfigError> {
-    let last_d = taken.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
+/// Planned profiles like those that have been taken with their data set: bins of the last of these, and a median error
+/// where no signal-to-noise ratio is planned.
+fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings) -> Result<Ahead, ConfigError> {
+    let PlannedProfiles { key, set, band, section } = plan;
+    let taken = &scene.observations.profiles[scene.imager.profiles_of(*set)];
+    let last_d = scene.observations.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
     // nights of a place are not those of the time scale
-    let usual_d = if plan.site.is_some() { last_d + 1.0 } else { last_d.floor() + 1.0 };
-    let first_d = plan.first_d.unwrap_or(usual_d);
-    let usual = median(taken.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect());
-    let sigma = plan.snr.map_or(usual, f64::recip);
-    let like = &taken.profiles[taken.profiles.len() - 1];
+    let usual_d = if section.site.is_some() { last_d + 1.0 } else { last_d.floor() + 1.0 };
+    let first_d = section.first_d.unwrap_or(usual_d);
+    let usual = median(taken.iter().flat_map(|profile| profile.sigma.clone()).collect());
+    let sigma = section.snr.map_or(usual, f64::recip);
+    let like = &taken[taken.len() - 1];
     let profile = |time_d: f64| Profile { time_d, sigma: vec![sigma; like.sigma.len()], ..like.clone() };
-    let times_d = match (&plan.times_d, &plan.site) {
+    let times_d = match (&section.times_d, &section.site) {
         (Some(listed), _) => listed.clone(),
-        (None, None) => plan.schedule.times_d(first_d),
+        (None, None) => section.schedule.times_d(first_d),
         (None, Some(site)) if !site.has_date(first_d) => {
             let problem = format!(
                 "time {first_d} is no Julian date from 1900 to 2100: give the Julian date of time 0, as 2400000.5 for \
                 MJD or 2457000 for BTJD"
             );
-            return Err(settings.fault("plan.site.time_zero_jd", &problem));
+            return Err(own.fault(&format!("{key}.site.time_zero_jd"), &problem));
         }
-        (None, Some(site)) => plan.schedule.times_within(first_d, &|begin_d| {
+        (None, Some(site)) => section.schedule.times_within(first_d, &|begin_d| {
             let [from, to] = site.window_d(begin_d)?;
             Some((from, to - from))
         }),
     };
     let before = times_d.iter().copied().find(|time_d| *time_d <= last_d);
-    if let Some(time_d) = before.filter(|_| plan.times_d.is_some()) {
+    if let Some(time_d) = before.filter(|_| section.times_d.is_some()) {
         let problem = format!("{time_d} is not after the last profile ({last_d}): give coming nights");
-        return Err(settings.fault("plan.times_d", &problem));
+        return Err(own.fault(&format!("{key}.times_d"), &problem));
     }
     if times_d.is_empty() {
         let problem = "in none of the nights is the star high enough while it is dark: another first_d, or a lower \
             min_altitude_deg";
-        return Err(settings.fault("plan.site", problem));
+        return Err(own.fault(&format!("{key}.site"), problem));
     }
-    Ok(Observations { profiles: times_d.into_iter().map(profile).collect() })
+    let site = section.site.as_ref().filter(|_| section.times_d.is_none());
+    let mut ahead = Ahead::new(*set, times_d.into_iter().map(profile).collect(), site);
+    if let Some(PlannedLight { cadence_d, sigma, .. }) = section.photometry {
+        let ends = |[a, b]: [f64; 2], profile: &Profile| [a.min(profile.time_d), b.max(profile.time_d)];
+        let ends = ahead.profiles.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+        let key = format!("{key}.photometry");
+        let times_d = at_cadence(own, &key, cadence_d, ends)?;
+        let width_d = bin_width_d(std::slice::from_ref(&times_d), scene.imager.star.rotation_period_d);
+        let fluxes: Vec<Flux> = times_d.iter().map(|time_d| Flux { time_d: *time_d, flux: 1.0, sigma }).collect();
+        ahead.light = Some(LightCurve::new(&key, *band, &fluxes, width_d, SEGMENT_GAP_D));
+    }
+    Ok(ahead)
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

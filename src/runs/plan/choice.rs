@@ -60,8 +60,11 @@ pub struct Merit {
 }
 
 /// A night that is chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChosenNight {
+    /// Data set, if there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub set: Option<String>,
     /// First and last time (d).
     pub span_d: [f64; 2],
     /// Its profiles.
@@ -112,10 +115,11 @@ const PRIOR: f64 = 1.0;
 impl Weighed<'_> {
     /// Standard errors of K with these coming nights.
     fn sigma(&self, nights: &[usize]) -> Result<Sigma, FieldError> {
-        let mut part: Vec<usize> = (0..self.campaign.before()).collect();
-        part.extend(nights.iter().flat_map(|night| self.campaign.nights[*night].iter().copied()));
+        // light curves that are planned are of all nights, whichever are taken
+        let light_until_d = if nights.is_empty() { f64::NEG_INFINITY } else { f64::INFINITY };
+        let mut part = self.campaign.after(nights, light_until_d);
         part.sort_unstable();
-        if part.is_empty() {
+        if self.campaign.profiles_of(&part).is_empty() {
             return Ok(Sigma { beside_prior: PRIOR.sqrt().recip(), alone: f64::INFINITY });
         }
         let mut sums = [0.0; 2];
@@ -186,13 +190,7 @@ pub fn choose(
 ) -> Result<Choice, PlanError> {
     let field = |source| PlanError::Field { name: campaign.name.clone(), source };
     let nuisances = if settings.fixed { Vec::new() } else { nuisances(&campaign.settings.free) };
-    let planned = Planned::new(
-        &campaign.imager,
-        campaign.settings.values,
-        campaign.assumed,
-        &nuisances,
-        campaign.taken.as_deref(),
-    );
+    let planned = campaign.planned(&nuisances);
     let maps = match settings.maps {
         0 => vec![planned.mean_maps()],
         many => (0..many.min(MAPS))
@@ -258,6 +256,11 @@ impl Campaign {
         let times = self.imager.times_d();
         let of = self.nights[night].iter().map(|k| times[*k]);
         let [first, last] = of.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], t| [a.min(t), b.max(t)]);
-        ChosenNight { span_d: [first, last], profiles: self.nights[night].len(), sigma_k_kms }
+        ChosenNight {
+            set: self.set_of(night).map(str::to_owned),
+            span_d: [first, last],
+            profiles: self.nights[night].len(),
+            sigma_k_kms,
+        }
     }
 }

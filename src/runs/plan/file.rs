@@ -1,6 +1,6 @@
 //! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
 
-use super::{Aim, Campaign, Choice, Expected, Outlook, PlanSettings, SpotsSource};
+use super::{Aim, Campaign, Choice, Expected, Outlook, PlanSettings, SetRecord, SpotsSource};
 use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
@@ -66,6 +66,12 @@ pub struct ScheduleRecord {
     pub rotation_period_d: f64,
     /// Signal-to-noise ratio of a planned bin.
     pub snr: f64,
+    /// The data sets, if there are several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<SetRecord>,
+    /// Bins of each light curve by its name, planned ones among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub light_curves: Vec<(String, usize)>,
     /// The spots that are integrated out.
     pub spots: SpotsRecord,
     /// Delta ln L of a detection, after all nights.
@@ -259,6 +265,8 @@ impl ScheduleRecord {
             span_d: campaign.span_d(),
             rotation_period_d: prot,
             snr: 1.0 / campaign.sigma,
+            sets: campaign.sets.clone(),
+            light_curves: campaign.imager.light_curves.iter().map(|of| (of.name.clone(), of.bins.len())).collect(),
             spots: SpotsRecord {
                 source: campaign.source,
                 spot_amplitude: spectrum.amplitude,
@@ -286,10 +294,18 @@ impl ScheduleRecord {
         let lives = spot_lifetime_d.map_or("static".into(), |d| format!("lifetime {d:.1} d"));
         let mut text = format!(
             "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); RV jitter \
-            {velocity_jitter_kms:.4} km/s; S/N {:.0}\n\n",
+            {velocity_jitter_kms:.4} km/s; S/N {:.0}\n",
             source.words(),
             self.snr
         );
+        for SetRecord { name, taken, planned, nights, snr } in &self.sets {
+            let snr = snr.map_or_else(String::new, |snr| format!(" of S/N {snr:.0}"));
+            text += &format!("{name}: {taken} profiles taken, {planned}{snr} planned in {nights} nights\n");
+        }
+        for (name, bins) in &self.light_curves {
+            text += &format!("{name}: {bins} bins\n");
+        }
+        text.push('\n');
         let head = ["nights", "profiles", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
         let row = |after: &AfterRecord| {
             let counts = [after.nights, after.profiles].map(|n| n.to_string());
@@ -356,10 +372,13 @@ impl Choice {
     /// The nights, what each adds, and what others would.
     fn table(&self) -> String {
         let sigma = |kms: Option<f64>| kms.map_or_else(|| "not bounded".into(), |kms| speed(kms, 0.1 * kms));
-        let head = ["night", "first time (d)", "profiles", "sigma_K with it"].map(str::to_owned).to_vec();
+        let several = self.chosen.iter().any(|night| night.set.is_some());
+        let mut head = ["night", "first time (d)", "profiles", "sigma_K with it"].map(str::to_owned).to_vec();
+        head.extend(several.then(|| "data set".to_owned()));
         let row = |(k, night): (usize, &super::ChosenNight)| {
             let first = format!("{:.2}", night.span_d[0]);
-            vec![(k + 1).to_string(), first, night.profiles.to_string(), sigma(night.sigma_k_kms)]
+            let cells = [(k + 1).to_string(), first, night.profiles.to_string(), sigma(night.sigma_k_kms)];
+            cells.into_iter().chain(night.set.clone()).collect()
         };
         let nights = self.chosen.len();
         let last = |of: &[super::Merit]| sigma(of.last().and_then(|merit| merit.sigma_k_kms));

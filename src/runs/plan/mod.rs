@@ -15,7 +15,7 @@ mod file;
 mod forecast;
 mod outlook;
 
-pub use campaign::{Campaign, CampaignError, SpotsSource};
+pub use campaign::{Campaign, CampaignError, SetRecord, SpotsSource};
 pub use choice::{Aim, Choice, ChosenNight, Merit};
 pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
 pub use forecast::{Forecast, ForecastError, Next};
@@ -24,7 +24,6 @@ pub use outlook::{Expected, Outlook};
 use crate::field::FieldError;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
 use crate::surface::expansion::nuisances;
-use crate::surface::planned::Planned;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -109,8 +108,7 @@ pub fn outlook(
     let began = Instant::now();
     let field = |source| PlanError::Field { name: campaign.name.clone(), source };
     let nuisances = if settings.fixed { Vec::new() } else { nuisances(&campaign.settings.free) };
-    let values = campaign.settings.values;
-    let planned = Planned::new(&campaign.imager, values, campaign.assumed, &nuisances, campaign.taken.as_deref());
+    let planned = campaign.planned(&nuisances);
     let wanted =
         FrequencySettings { min_period_d: Some(range_d[0]), max_period_d: Some(range_d[1]), oversampling: None };
     let looks: Vec<(usize, Vec<usize>, Frequencies)> = campaign
@@ -137,7 +135,7 @@ pub fn outlook(
         report(&format!("{}: {profiles} profiles, map {done} of {all}, some {left:.0} s left", campaign.name));
     }
     let outlook = |((nights, part, frequencies), quadratics): ((usize, Vec<usize>, Frequencies), Vec<_>)| {
-        Outlook::new(nights, part.len(), quadratics, frequencies, settings)
+        Outlook::new(nights, campaign.profiles_of(&part).len(), quadratics, frequencies, settings)
     };
     Ok(looks.into_iter().zip(quadratics).map(outlook).collect())
 }

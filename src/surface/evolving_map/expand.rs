@@ -1,5 +1,6 @@
 //! ln Z to second order in the velocities of the profiles and in the star's own parameters.
 
+use super::light::Light;
 use super::{Design, Marginal};
 use crate::field::{FieldError, Quadratic};
 use crate::model::{Parameter, ParameterValues};
@@ -138,7 +139,8 @@ impl Marginal {
             return self.velocity_slopes(imager).to_vec();
         }
         let mut slopes = self.design.condensed(&self.slopes(imager, stellar));
-        slopes.extend(self.flux_slopes(imager, stellar));
+        let of_light = self.settled.coefficients.columns_range(slopes.len()..);
+        slopes.extend(Light::slopes((imager, &self.basis), &self.values, of_light.as_view(), stellar));
         slopes
     }
 

@@ -8,7 +8,7 @@
 use super::indicators;
 use super::{Basis, MEAN_FILLING, Marginal};
 use crate::field::Epoch;
-use crate::model::Parameter;
+use crate::model::{Parameter, ParameterValues};
 use crate::star::StarState;
 use crate::surface::expansion::stellar_step;
 use crate::surface::imaging::Imager;
@@ -116,6 +116,31 @@ impl Light {
         epochs
     }
 
+    /// How the flux of each bin, and each reading, changes with a velocity, which is not at all, and with the star's
+    /// parameters at `values`, for maps of these coefficients (H, bins and readings): (1, 1 + parameters) each.
+    pub fn slopes(
+        (imager, basis): (&Imager, &Basis),
+        values: &ParameterValues,
+        maps: DMatrixView<f64>,
+        stellar: &[Parameter],
+    ) -> Vec<DMatrix<f64>> {
+        let mut slopes = vec![DMatrix::zeros(1, 1 + stellar.len()); maps.ncols()];
+        if slopes.is_empty() {
+            return slopes;
+        }
+        let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
+        for (s, parameter) in stellar.iter().enumerate() {
+            let h = stellar_step(*parameter, values, time_base_d);
+            let [above, below] = [h, -h].map(|h| {
+                let mut values = *values;
+                values.set(*parameter, values[*parameter] + h);
+                Light::new(imager, basis, &values.state()).fluxes(maps)
+            });
+            slopes.iter_mut().enumerate().for_each(|(k, own)| own[1 + s] = (above[k] - below[k]) / (2.0 * h));
+        }
+        slopes
+    }
+
     /// Flux of each bin, and then what spots do to each reading, before level and slope.
     fn fluxes(&self, maps: DMatrixView<f64>) -> DVector<f64> {
         let bins = self.jacobian.nrows();
@@ -173,28 +198,6 @@ pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
 }
 
 impl Marginal {
-    /// How the flux of each bin changes with a velocity, which is not at all, and with the star's parameters, at the
-    /// most probable maps (1, 1 + parameters).
-    pub(super) fn flux_slopes(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
-        let profiles = self.design.response().profiles();
-        let maps = self.settled.coefficients.columns_range(profiles..);
-        let mut slopes = vec![DMatrix::zeros(1, 1 + stellar.len()); maps.ncols()];
-        if slopes.is_empty() {
-            return slopes;
-        }
-        let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
-        for (s, parameter) in stellar.iter().enumerate() {
-            let h = stellar_step(*parameter, &self.values, time_base_d);
-            let [above, below] = [h, -h].map(|h| {
-                let mut values = self.values;
-                values.set(*parameter, values[*parameter] + h);
-                Light::new(imager, &self.basis, &values.state()).fluxes(maps.as_view())
-            });
-            slopes.iter_mut().enumerate().for_each(|(k, own)| own[1 + s] = (above[k] - below[k]) / (2.0 * h));
-        }
-        slopes
-    }
-
     /// What the most probable maps leave of each bin of the light curves and of each reading of the indicators, level
     /// and slope of each segment and indicator where they are most probable given these maps.
     fn beside_profiles(&self, imager: &Imager) -> Vec<f64> {

@@ -3,6 +3,7 @@
 //! slopes are made linear at: one that is drawn from the field, given the data that there are.
 
 use super::expand::{summed, with_integrated};
+use super::light::Light;
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Epoch, Evidence, FieldError};
 use crate::model::{Parameter, ParameterValues};
@@ -17,30 +18,32 @@ use rand_chacha::ChaCha8Rng;
 /// Stream of the random numbers of maps.
 const STREAM: u64 = 5;
 
-/// Profiles that are planned, after those that have been taken, of one star.
+/// Profiles and light curves that are planned beside those that have been taken, of one star. Epochs are profiles, and
+/// then bins of light curves.
 #[derive(Debug)]
 pub struct Planned<'a> {
-    /// Times, bins and noise of all profiles, those that have been taken first.
+    /// Times, bins and noise of all of them.
     imager: &'a Imager,
     /// Spots before the data, jitter.
     assumed: Assumed,
     /// What is integrated out.
     nuisances: &'a [Nuisance],
-    /// Those that have been taken.
-    taken: Option<&'a Marginal>,
+    /// What has been taken, and numbers of its epochs among all.
+    taken: Option<(&'a Marginal, &'a [usize])>,
     values: ParameterValues,
     basis: Basis,
     design: Design,
 }
 
 impl<'a> Planned<'a> {
-    /// Of a star at `values`, without a planet, with the profiles of `imager`, of which those of `taken` come first.
+    /// Of a star at `values`, without a planet, with the data of `imager`, among which those of `taken` have these
+    /// numbers.
     pub fn new(
         imager: &'a Imager,
         mut values: ParameterValues,
         assumed: Assumed,
         nuisances: &'a [Nuisance],
-        taken: Option<&'a Marginal>,
+        taken: Option<(&'a Marginal, &'a [usize])>,
     ) -> Self {
         values.set(Parameter::K, 0.0);
         let basis = Basis::new(&imager.grid);
@@ -48,47 +51,54 @@ impl<'a> Planned<'a> {
         Planned { imager, assumed, nuisances, taken, values, basis, design }
     }
 
-    /// Coefficients (H, profiles) of unspotted stars: the mean of the field.
+    /// Coefficients (H, epochs) of unspotted stars: the mean of the field.
     pub fn mean_maps(&self) -> DMatrix<f64> {
-        DMatrix::zeros(self.basis.len(), self.imager.profiles().count())
+        DMatrix::zeros(self.basis.len(), self.imager.times_of_all_d().len())
     }
 
-    /// Coefficients (H, profiles) of a map drawn for the time of each profile: the most probable ones where profiles
-    /// have been taken.
+    /// Coefficients (H, epochs) of a map drawn for the time of each epoch: the most probable ones where data have been
+    /// taken.
     ///
     /// # Errors
     /// [`FieldError`].
     pub fn drawn_maps(&self, seed: u64) -> Result<DMatrix<f64>, FieldError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
-        let times_d: Vec<f64> = self.imager.times_d();
-        let Some(taken) = self.taken else {
+        let times_d = self.imager.times_of_all_d();
+        let Some((taken, numbers)) = self.taken else {
             return Ok(self.assumed.field.drawn(&self.basis.degrees, &times_d, &mut rng));
         };
-        let known = &taken.settled.coefficients;
-        let mut maps = known.clone().resize_horizontally(times_d.len(), 0.0);
-        let epochs = self.epochs(&maps, 0..known.ncols());
+        let mut maps = self.mean_maps();
+        let put = |maps: &mut DMatrix<f64>, numbers: &[usize], found: &DMatrix<f64>| {
+            numbers.iter().zip(found.column_iter()).for_each(|(k, map)| maps.set_column(*k, &map));
+        };
+        put(&mut maps, numbers, &taken.settled.coefficients);
+        let epochs = self.epochs(&maps);
+        let epochs: Vec<Epoch> = numbers.iter().map(|k| epochs[*k].clone()).collect();
+        let others: Vec<usize> = (0..times_d.len()).filter(|k| !numbers.contains(k)).collect();
+        let of_others: Vec<f64> = others.iter().map(|k| times_d[*k]).collect();
         let how = self.basis.settling.compression;
-        let drawn = taken.settled.evidence.drawn(&epochs, how, &times_d[known.ncols()..], &mut rng)?;
-        maps.columns_mut(known.ncols(), drawn.ncols()).copy_from(&drawn);
+        put(&mut maps, &others, &taken.settled.evidence.drawn(&epochs, how, &of_others, &mut rng)?);
         Ok(maps)
     }
 
-    /// The quadratic in the orbit's velocities, without a gradient, of each of some `parts` (numbers of profiles) for
-    /// maps with these coefficients (H, profiles).
+    /// The quadratic in the orbit's velocities, without a gradient, of each of some `parts` (numbers of epochs) for
+    /// maps with these coefficients (H, epochs).
     ///
     /// # Errors
     /// [`FieldError`].
     pub fn velocities(&self, maps: &DMatrix<f64>, parts: &[Vec<usize>]) -> Result<Vec<VelocityQuadratic>, FieldError> {
-        let epochs = self.epochs(maps, 0..maps.ncols());
+        let epochs = self.epochs(maps);
         parts.iter().map(|part| self.of_part(maps, &epochs, part)).collect()
     }
 
-    /// Those of some profiles, linear around maps of these coefficients, with slopes and without misfits.
-    fn epochs(&self, maps: &DMatrix<f64>, profiles: std::ops::Range<usize>) -> Vec<Epoch> {
+    /// Linear around maps of these coefficients, with slopes and without misfits.
+    fn epochs(&self, maps: &DMatrix<f64>) -> Vec<Epoch> {
         let brightness = self.design.brightness(&self.basis, maps);
         let slopes = self.design.slopes(self.imager, &self.values, &brightness, &self.stellar());
-        let slopes = self.design.condensed(&slopes);
+        let mut slopes = self.design.condensed(&slopes);
+        let of_light = maps.columns_range(slopes.len()..);
+        slopes.extend(Light::slopes((self.imager, &self.basis), &self.values, of_light.as_view(), &self.stellar()));
         let shares = self.imager.jitter_share_of_each().into_iter().chain(std::iter::repeat(1.0));
         let noisy = |((epoch, slopes), share): ((Epoch, DMatrix<f64>), f64)| {
             let misfit = DVector::zeros(epoch.len());
@@ -99,24 +109,28 @@ impl<'a> Planned<'a> {
             // where ln Z would be expanded says nothing of information
             Epoch { slopes, divisor: DVector::zeros(0), ..epoch }
         };
-        let all = self.design.epochs(self.imager, maps).into_iter().zip(slopes).zip(shares);
-        all.skip(profiles.start).take(profiles.len()).map(noisy).collect()
+        self.design.epochs(self.imager, maps).into_iter().zip(slopes).zip(shares).map(noisy).collect()
     }
 
     fn of_part(&self, maps: &DMatrix<f64>, epochs: &[Epoch], part: &[usize]) -> Result<VelocityQuadratic, FieldError> {
+        let count = self.imager.profiles().count();
+        // profiles first, as everywhere
+        let (profiles, bins): (Vec<usize>, Vec<usize>) = part.iter().partition(|k| **k < count);
+        let part = &[&profiles[..], &bins].concat();
         let some: Vec<Epoch> = part.iter().map(|k| epochs[*k].clone()).collect();
         let around = maps.select_columns(part);
         let (field, degrees) = (self.assumed.field, &self.basis.degrees);
         let evidence = Evidence::new(field, degrees, &some, &around, self.basis.settling.compression)?;
         let stellar = self.stellar();
-        let quadratic = summed(evidence.quadratic(), some.len(), some.len(), stellar.len());
-        let offsets = self.imager.night_offsets(maps.ncols()).into_iter().map(|offset| Common {
-            of_each: DVector::from_fn(quadratic.gradient.len(), |i, _| part.get(i).map_or(0.0, |k| offset.of_each[*k])),
-            ..offset
-        });
-        let information = with_integrated(quadratic.clone(), &offsets.collect::<Vec<_>>())?.information;
+        let quadratic = summed(evidence.quadratic(), some.len(), profiles.len(), stellar.len());
+        let shared = self.imager.night_offsets(count).into_iter().chain(self.imager.common_velocities(count));
+        let of_part = |one: Common| {
+            let of = |i: usize| profiles.get(i).map_or(0.0, |k| one.of_each[*k]);
+            Common { of_each: DVector::from_fn(quadratic.gradient.len(), |i, _| of(i)), ..one }
+        };
+        let information = with_integrated(quadratic.clone(), &shared.map(of_part).collect::<Vec<_>>())?.information;
         let all = self.imager.cycles();
-        let cycles: Vec<f64> = part.iter().map(|k| all[*k]).collect();
+        let cycles: Vec<f64> = profiles.iter().map(|k| all[*k]).collect();
         let expansion = Expansion {
             values: self.values,
             centre: coordinates(&self.values, &cycles, &stellar),

@@ -9,6 +9,7 @@ mod observations;
 mod orbits;
 mod parameters;
 mod photometry;
+mod plan;
 mod simulation;
 mod star;
 
@@ -16,11 +17,12 @@ pub use grid::{GridSettings, MOST_NODES};
 pub use indicators::IndicatorSettings;
 pub use observations::{DataSetSettings, ObservationSource, too_long};
 pub use photometry::{LightCurveSettings, LightSource};
+pub use plan::PlannedProfiles;
 pub use star::FITTED;
 
 use super::error::{ConfigError, Fault};
 use super::identity::fingerprint;
-use super::written::{Config, Hyperparameter, ImagingSettings, OfField, PlanSection, VelocityDrift, VelocityJitter};
+use super::written::{Config, Hyperparameter, ImagingSettings, OfField, VelocityDrift, VelocityJitter};
 use crate::field::Lifetime;
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::ensemble::SamplerSettings;
@@ -34,7 +36,7 @@ use observations::{has_own_jitters, largest_jitter_kms, resolve_sets};
 use orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use parameters::{check_value, resolve_prior};
 use photometry::resolve_photometry;
-use simulation::check_plan;
+use plan::resolve_plan;
 use star::{fitted_star, resolve_instrument, resolve_star};
 use std::path::{Path, PathBuf};
 
@@ -61,8 +63,8 @@ pub struct Settings {
     pub light_curves: Vec<LightCurveSettings>,
     /// The activity indicators, mostly none.
     pub indicators: Vec<IndicatorSettings>,
-    /// What is planned beside them.
-    pub plan: Option<PlanSection>,
+    /// What is planned beside them, mostly nothing.
+    pub plan: Vec<PlannedProfiles>,
     /// Scatter of the profiles' velocity zero points.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
@@ -94,10 +96,10 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
     let mut values = values(&written, &star)?;
     let size = Size::of(star.rotation_period_d, written.star.vsini_kms, written.star.inclination_deg);
     size.refused().map_or(Ok(()), |(key, problem)| Err(Fault::new(key, problem)))?;
-    written.plan.as_ref().map_or(Ok(()), check_plan)?;
     check_brightness(&mut written.imaging)?;
     let sets = resolve_sets(&mut written, &star, &values, path)?;
     let light_curves = resolve_photometry(&written, path)?;
+    let plan = resolve_plan(&written, &sets, &light_curves)?;
     let indicators = resolve_indicators(&written, path)?;
     let velocity_jitter = resolve_jitter(&mut written);
     check_imaging(&written.imaging, velocity_jitter)?;
@@ -135,7 +137,7 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
         sets,
         light_curves,
         indicators,
-        plan: written.plan,
+        plan,
         velocity_jitter,
         imaging: written.imaging,
         free,

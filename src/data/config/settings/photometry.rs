@@ -107,6 +107,18 @@ fn band(written: &Config, section: &PhotometrySection, key: &str) -> Result<Band
     Ok(Band { contrast, limb_darkening })
 }
 
+/// That a cadence (d) and an error, in units of the flux, make sense; `key` is the section that has them.
+pub(super) fn check_light(key: &str, cadence_d: f64, sigma: f64) -> Result<(), Fault> {
+    let [cadence, error] = ["cadence_d", "sigma"].map(|field| format!("{key}.{field}"));
+    positive(&cadence, cadence_d)?;
+    check_size(&cadence, cadence_d, most::TIME)?;
+    positive(&error, sigma)?;
+    match sigma > 1.0 {
+        true => Err(Fault::new(error, format!("{sigma} must be at most 1, the flux itself"))),
+        false => Ok(()),
+    }
+}
+
 fn source(written: &Config, section: &PhotometrySection, key: &str, config: &Path) -> Result<LightSource, Fault> {
     let at = |field: &str| format!("{key}.{field}");
     match (&section.path, &section.simulate) {
@@ -114,12 +126,7 @@ fn source(written: &Config, section: &PhotometrySection, key: &str, config: &Pat
         (Some(path), None) => Ok(LightSource::File(config.parent().unwrap_or(Path::new("")).join(path))),
         (None, Some(simulate)) => {
             let SimulatedLight { cadence_d, sigma, .. } = *simulate;
-            positive(&at("simulate.cadence_d"), cadence_d)?;
-            check_size(&at("simulate.cadence_d"), cadence_d, most::TIME)?;
-            positive(&at("simulate.sigma"), sigma)?;
-            if sigma > 1.0 {
-                return Err(Fault::new(at("simulate.sigma"), format!("{sigma} must be at most 1, the flux itself")));
-            }
+            check_light(&at("simulate"), cadence_d, sigma)?;
             if written.observations.sections[0].simulate.is_none() {
                 let problem = "the star is not simulated: give observations.simulate, or a path";
                 return Err(Fault::new(at("simulate"), problem));

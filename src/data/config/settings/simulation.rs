@@ -5,8 +5,8 @@ use super::checks::{
 };
 use super::parameters::check_value;
 use crate::data::config::error::Fault;
-use crate::data::config::written::{PlanSection, SimulateSection, VelocitySection};
-use crate::data::simulate::{RandomSpots, Schedule, Simulation, Site};
+use crate::data::config::written::{SimulateSection, VelocitySection};
+use crate::data::simulate::{RandomSpots, Schedule, Simulation};
 use crate::model::{Clock, Elements, Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
 use crate::surface::nuisances::LineAndContinuum;
@@ -126,7 +126,7 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str)
 }
 
 /// Whether the schedule at `key` makes sense.
-fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
+pub(super) fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
     let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
         *schedule;
     let key = |field: &str| format!("{key}.{field}");
@@ -165,7 +165,7 @@ fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
 }
 
 /// Its times (d) from `first_d` on.
-fn scheduled(schedule: &Schedule, key: &str, first_d: f64) -> Result<Vec<f64>, Fault> {
+pub(super) fn scheduled(schedule: &Schedule, key: &str, first_d: f64) -> Result<Vec<f64>, Fault> {
     let times_d = schedule.times_d(first_d);
     match times_d.is_empty() {
         true => {
@@ -174,25 +174,6 @@ fn scheduled(schedule: &Schedule, key: &str, first_d: f64) -> Result<Vec<f64>, F
         }
         false => Ok(times_d),
     }
-}
-
-/// What is planned, checked.
-pub(super) fn check_plan(plan: &PlanSection) -> Result<(), Fault> {
-    check_schedule(&plan.schedule, "plan.schedule")?;
-    scheduled(&plan.schedule, "plan.schedule", 0.0)?;
-    if let Some(first_d) = plan.first_d {
-        check_size("plan.first_d", first_d, most::TIME)?;
-    }
-    if let Some(times_d) = &plan.times_d {
-        if times_d.is_empty() {
-            return Err(Fault::new("plan.times_d", "is empty, give one time at least"));
-        }
-        times_d.iter().try_for_each(|time_d| check_size("plan.times_d", *time_d, most::TIME))?;
-    }
-    if let Some((key, problem)) = plan.site.as_ref().and_then(Site::fault) {
-        return Err(Fault::new(format!("plan.site.{key}"), problem));
-    }
-    plan.snr.map_or(Ok(()), |snr| positive("plan.snr", snr))
 }
 
 /// The spots, listed ones first.

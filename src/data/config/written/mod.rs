@@ -2,7 +2,7 @@
 //! descriptions of the JSON Schema.
 //!
 //! What is made of a section is in the file of `settings` that has the same name: of planets in `orbits`, of priors in
-//! `parameters`, of simulations and plans in `simulation`.
+//! `parameters`, of simulations in `simulation`.
 
 mod imaging;
 mod indicators;
@@ -11,6 +11,7 @@ mod number_or;
 mod observations;
 mod per_parameter;
 mod photometry;
+mod plan;
 mod star;
 
 pub use imaging::ImagingSettings;
@@ -20,12 +21,12 @@ pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, Velocit
 pub use observations::{EventWindows, EventsKey, EventsWord, ObservationsSection, SimulateSection, VelocitySection};
 pub use per_parameter::{PerParameter, Planet};
 pub use photometry::{OutlierTreatment, PhotometrySection, SEGMENT_GAP_D, SimulatedLight};
+pub use plan::{PlanSection, PlannedLight};
 pub use star::{
     Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star, USUAL_LIMB_DARKENING,
     USUAL_WAVELENGTH_NM, VelocityDrift,
 };
 
-use crate::data::simulate::{Schedule, Site};
 use crate::model::{Parameter, PriorKind};
 use crate::sampling::ensemble::SamplerSettings;
 use schemars::JsonSchema;
@@ -57,9 +58,9 @@ pub struct Config {
     /// without a significant gain is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub indicators: Option<Listed<IndicatorSection>>,
-    /// Profiles to be planned beside the observations.
+    /// Profiles to be planned beside the observations: of one data set, or a list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plan: Option<PlanSection>,
+    pub plan: Option<Listed<PlanSection>>,
     /// The Doppler image.
     #[serde(default)]
     pub imaging: ImagingSettings,
@@ -119,30 +120,6 @@ impl PriorSection {
     pub fn even(prior: PriorKind, (min, max): (f64, f64)) -> Self {
         PriorSection { prior, min: Some(min), max: Some(max), mean: None, sd: None }
     }
-}
-
-/// Profiles that are planned beside those of `observations`, for the command `plan` alone.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PlanSection {
-    /// When they are taken.
-    #[serde(default)]
-    pub schedule: Schedule,
-    /// Times of the profiles (d), on the time scale of the observations, in place of `schedule`, `first_d` and `site`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub times_d: Option<Vec<f64>>,
-    /// Time of the first night (d), on the time scale of the observations; the day after the last profile, if not
-    /// given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub first_d: Option<f64>,
-    /// Signal-to-noise ratio of each bin, above 0; that of the observed profiles, if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub snr: Option<f64>,
-    /// From where: profiles are spread over the time in which the star is observable, in place of
-    /// `schedule.night_hours`, and nights in which it is not are left out. Times must then be Julian dates, or such
-    /// less `time_zero_jd`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub site: Option<Site>,
 }
 
 /// The likelihood grid of `dimcmc grid`: ln L of the maps, without priors. Parameters without an axis are fixed at
