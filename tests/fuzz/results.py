@@ -34,11 +34,11 @@ COMMANDS = [
     "grid config.json --out grid",
     "sample config.json --out sample",
     "sample config.json --out seed_4 --seed 4",
-    "periodogram config.json --out periodogram --draws 100",
+    "periodogram config.json --out periodogram --draws 1000",
     "compare sample grid --out compare",
     "inject config.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.2 --out inject",
     "limits config.json --min-period-d 2 --max-period-d 8 --periods 4 --amplitudes 4 --phases 4 --out limits",
-    "plan config.json --nights 3,5 --maps 0 --draws 100 --out plan",
+    "plan config.json --nights 2,3 --maps 0 --draws 1000 --out plan",
     "survey periodogram limits --out survey",
 ]
 
@@ -46,7 +46,9 @@ program, folder = (pathlib.Path(name).absolute() for name in sys.argv[1:])
 folder.mkdir(parents=True)
 (folder / "config.json").write_text(json.dumps(CONFIG))
 # a star that does not change
-CONFIG["imaging"] = {"objective": "spottedness", "pixels": 100, "chi2_target": 1.0}
+CONFIG["imaging"] = {"objective": "spottedness", "pixels": 100, "chi2_target": 1.2}
+CONFIG["observations"]["simulate"]["random_spots"]["lifetime_d"] = None
+CONFIG["observations"]["simulate"]["snr"] = 100
 (folder / "static.json").write_text(json.dumps(CONFIG))
 for command in COMMANDS + ["map static.json --out static"]:
     done = subprocess.run([program, *command.split()], cwd=folder, capture_output=True, text=True)

@@ -161,7 +161,7 @@ proptest! {
         star in (0.5..10.0f64, 30.0..90.0f64, 5.0..90.0f64, 0.01..0.9f64, 1.0..8.0f64),
         orbit in (0.0..3.0f64, 0.1..20.0f64, -1.0..2.0f64),
         sampler in (1..6usize, 8..40usize, 1..100_000usize, any::<u32>(), 1.01..1.5f64),
-        name in "\\PC{0,12}",
+        name in "[a-z]\\PC{0,12}",
     ) {
         let (ensembles, walkers, steps, seed, rhat) = sampler;
         let config = Config::default()

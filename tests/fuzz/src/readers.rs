@@ -1,7 +1,7 @@
 //! Every reader of the program, by name: hands it a file, and takes whatever it says but a panic.
 //!
 //! Those of [`INPUTS`] read what a user brings: the bytes are the file. All other names are those of a file of results,
-//! such as `map/map.json`: the bytes are edits of it ([`edited`]), and its folder is read as `report`, `plot`, `export`,
+//! such as `map/map.json`: the bytes are edits of it ([`edited`]), and its folder is read as `report`, `export`,
 //! `survey` and others do.
 
 use dimcmc::internals::data::config::Config;
@@ -81,7 +81,7 @@ pub fn read(reader: &str, folder: &Path, bytes: &[u8]) {
         "stars" => {
             let [group, reliability] = ["group", "reliability"].map(|name| Some(name.to_owned()));
             let table = Some(StarTable { path: file, group, reliability });
-            drop(survey(&folder.join("limits"), SurveySettings { table, ..SurveySettings::default() }));
+            drop(survey(folder, SurveySettings { table, ..SurveySettings::default() }));
         }
         "box" => {
             let text = String::from_utf8_lossy(bytes);
@@ -107,7 +107,7 @@ pub fn read(reader: &str, folder: &Path, bytes: &[u8]) {
                 let _ = (table.column("a"), table.column_within("b", [0.0, 1.0]), table.check_rows(3, "it says so"));
             }
         }
-        "words" => drop(Words::read(&file).map(|table| table.column("name").map(<[_]>::len))),
+        "words" => drop(Words::read(&file).map(|table| table.column("name").map(|cells| cells.len()))),
         result => {
             let path = folder.join(result);
             let before = std::fs::read(&path).expect("the results are there");
@@ -139,15 +139,15 @@ fn read_folder(result: &str, all: &Path) {
         "grid" => drop(Pair::read(&all.join("sample"), &folder)),
         "periodogram" | "limits" => {
             let _ = velocities::write(&folder, &all.join("velocities"), true);
-            drop(survey(&folder, SurveySettings::default()));
+            drop(survey(all, SurveySettings::default()));
         }
         _ => {}
     }
 }
 
-/// The sample of the search and the limits in `folder`.
-fn survey(folder: &Path, settings: SurveySettings) -> Option<String> {
-    Some(Survey::of(&[folder.to_owned()], &settings).ok()?.table())
+/// The sample of the search and the limits in the results.
+fn survey(all: &Path, settings: SurveySettings) -> Option<String> {
+    Some(Survey::of(&["periodogram", "limits"].map(|name| all.join(name)), &settings).ok()?.table())
 }
 
 /// A file of results with edits: `text` is a JSON array of `["/pointer", value]`, which sets or appends (`/-`), and
@@ -179,7 +179,9 @@ pub fn edited(name: &str, before: &[u8], text: &[u8]) -> Option<Vec<u8>> {
 pub fn taken_apart(name: &str, bytes: &[u8]) -> Option<Value> {
     let lines = || std::str::from_utf8(bytes).ok().map(str::lines);
     match name.rsplit_once('.')?.1 {
-        "jsonl" => lines()?.map(|line| serde_json::from_str(line).ok()).collect::<Option<Vec<Value>>>().map(Value::from),
+        "jsonl" => {
+            lines()?.map(|line| serde_json::from_str(line).ok()).collect::<Option<Vec<Value>>>().map(Value::from)
+        }
         "csv" => Some(lines()?.map(|line| Value::from(line.split(',').collect::<Vec<_>>())).collect::<Vec<_>>().into()),
         _ => serde_json::from_slice(bytes).ok(),
     }
