@@ -63,6 +63,9 @@ fn status() -> impl Strategy<Value = Status> {
     prop_oneof![Just(Status::Converged), Just(Status::Unreachable), Just(Status::StoppedShort), Just(Status::NonFinite)]
 }
 
+/// What a line of a chain holds beside its place.
+type Line = (f64, Vec<f64>, bool, Status, Status, u32, Option<MoveKind>);
+
 /// A chain.
 fn chain() -> impl Strategy<Value = Chain> {
     let by = prop_oneof![Just(None), proptest::sample::select(MoveKind::ALL.to_vec()).prop_map(Some)];
@@ -73,7 +76,7 @@ fn chain() -> impl Strategy<Value = Chain> {
         let shape = Shape { names: names(parameters, "p"), numbers: names(numbers, "n"), ensembles, walkers };
         let mut chain = Chain::new(shape.clone());
         for (step, lines) in lines.chunks_exact(shape.size()).enumerate() {
-            let record = |(k, line): (usize, &(f64, Vec<f64>, bool, Status, Status, u32, Option<MoveKind>))| {
+            let record = |(k, line): (usize, &Line)| {
                 let (log_prob, values, accepted, status, proposed, model_applications, by) = line.clone();
                 Record {
                     ensemble: k / walkers,
