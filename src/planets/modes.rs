@@ -95,6 +95,7 @@ impl PeriodMode {
 /// The modes over a time base in rotations.
 fn parted(draws: &[(f64, f64)], time_base_cycles: f64) -> Vec<PeriodMode> {
     let mut draws: Vec<(f64, f64)> = draws.iter().map(|(ratio, k)| (1.0 / ratio, *k)).collect();
+    draws.retain(|draw| draw.0.is_finite());
     draws.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let (Some(first), Some(last)) = (draws.first(), draws.last()) else { return Vec::new() };
     let width = SMOOTHING / time_base_cycles;

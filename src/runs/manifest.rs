@@ -208,7 +208,7 @@ impl Manifest {
     fn has_shape(&self) -> bool {
         let walker = |theta: &Vec<f64>| theta.len() == self.names.len();
         let ensemble = |walkers: &Vec<Vec<f64>>| walkers.len() == self.walkers && walkers.iter().all(walker);
-        self.start.len() == self.ensembles && self.start.iter().all(ensemble)
+        self.shape().size() > 0 && self.start.len() == self.ensembles && self.start.iter().all(ensemble)
     }
 
     /// Writes it into a run's folder.

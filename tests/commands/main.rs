@@ -15,6 +15,7 @@ mod data_sets;
 mod export;
 mod exposures;
 mod faults;
+mod fuzzed;
 mod grid;
 mod import;
 mod indicators;

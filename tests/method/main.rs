@@ -27,6 +27,7 @@ mod pixels;
 mod plan;
 mod posterior;
 mod response;
+mod round_trips;
 mod simulate;
 mod surface;
 mod surrogate;

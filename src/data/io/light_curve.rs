@@ -208,7 +208,7 @@ fn numbers(row: &Row, columns: &Columns) -> Result<[f64; 3], Unused> {
         Brightness::Flux | Brightness::Indicator => [-LARGEST[1], LARGEST[1]],
         Brightness::Magnitude => MAGNITUDES,
     };
-    let positive = [f64::MIN_POSITIVE, LARGEST[1]];
+    let positive = [1.0 / LARGEST[1], LARGEST[1]];
     Ok([
         number(columns.time, [-LARGEST[0], LARGEST[0]])?,
         number(columns.value, values)?,

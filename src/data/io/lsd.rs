@@ -178,11 +178,12 @@ fn read_entries(
 fn begins((first, axis): (&Entry, Axis), (entry, own): (&Entry, Axis), start: usize) -> Result<f64, LsdError> {
     let star = axis.moved(-first.vrad_kms);
     let at = |first: f64, bin: i64| first + (bin + start as i64) as f64 * axis.step;
-    if let Some(bin) = axis.bin_of(&own) {
-        return Ok(at(axis.first, bin) - entry.vrad_kms);
-    }
-    if let Some(bin) = star.bin_of(&own.moved(-entry.vrad_kms)) {
-        return Ok(at(star.first, bin));
+    match (axis.bin_of(&own), star.bin_of(&own.moved(-entry.vrad_kms))) {
+        // one of them by chance: the other is nearer by more than rounding
+        (Some((_, off)), Some((bin, least))) if off > least + 1e-6 * axis.step => return Ok(at(star.first, bin)),
+        (Some((bin, _)), _) => return Ok(at(axis.first, bin) - entry.vrad_kms),
+        (None, Some((bin, _))) => return Ok(at(star.first, bin)),
+        (None, None) => {}
     }
     let cure = match axis.place(&own) {
         Some(place) => {

@@ -1,6 +1,7 @@
 //! Which columns of a table are those of a light curve, by the names that observers and archives give them.
 
 use crate::data::io::table::{self, Lines, Name, Table, readings};
+use std::collections::{HashMap, HashSet};
 
 /// What a column of brightness holds, or that of the values of an activity indicator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -286,14 +287,14 @@ impl Columns {
         if zero_jd.is_none() && !DAYS.contains(&names[time].unit.as_str()) {
             return Err(format!("column {}: times must be in days", names[time].written));
         }
+        // by name, the first of each: a table may have thousands of columns
+        let places: HashMap<&str, usize> = names.iter().enumerate().rev().map(|(k, name)| (&*name.bare, k)).collect();
         let of_error = |of: &str| {
-            let own = |error: &&str| [format!("{of}{error}"), format!("{error}{of}")];
-            let own: Vec<String> = OF_ERRORS.iter().flat_map(own).collect();
-            names.iter().position(|name| own.contains(&name.bare))
+            let own = OF_ERRORS.iter().flat_map(|error| [format!("{of}{error}"), format!("{error}{of}")]);
+            own.filter_map(|name| places.get(&*name).copied()).min()
         };
-        let is_error = |k: usize| {
-            ERRORS.contains(&&*names[k].bare) || (0..names.len()).any(|other| of_error(&names[other].bare) == Some(k))
-        };
+        let errors: HashSet<usize> = names.iter().filter_map(|name| of_error(&name.bare)).collect();
+        let is_error = |k: usize| ERRORS.contains(&&*names[k].bare) || errors.contains(&k);
         let is_other = |name: &Name| FLAGS.contains(&&*name.bare) || BANDS.contains(&&*name.bare);
         let is_value = |k: &usize| *k != time && !is_error(*k) && !is_other(&names[*k]);
         let plain = names.iter().position(|name| name.bare == "value");

@@ -25,6 +25,9 @@ const HALF_A_DIGIT: f64 = 0.7;
 /// Velocities of this size (km/s) are in another unit.
 const BEYOND_SENSE_KMS: f64 = 1e4;
 
+/// So are steps below this (km/s).
+const FINEST_KMS: f64 = 1e-4;
+
 impl Axis {
     /// The axis through the first and last row, if every row lies on it.
     pub fn through(rows: &[Row]) -> Result<Self, Fault> {
@@ -37,6 +40,9 @@ impl Axis {
         }
         let first = rows[0].velocity;
         let step = (rows[rows.len() - 1].velocity - first) / (rows.len() - 1) as f64;
+        if step < FINEST_KMS {
+            return fault(rows[0].line, format!("velocities are {step:e} km/s apart; are they in km/s?"));
+        }
         let axis = Axis { first, step, bins: rows.len(), rounding: 0.0 };
         match (0..rows.len()).all(|j| axis.deviation(rows, j) <= UNIFORMITY) {
             true => Ok(axis),
@@ -102,14 +108,13 @@ impl Axis {
         ((other.at(other.bins - 1) - due).abs() <= 2.0 * tolerance).then_some(place)
     }
 
-    /// At which of its bins another axis on the same bins begins; `None` where its bins are others: both ends must
-    /// agree within 1 % of a step.
-    pub fn bin_of(&self, other: &Axis) -> Option<i64> {
+    /// At which of its bins another axis on the same bins begins, and by how much it is off them (km/s); `None` where
+    /// its bins are others: both ends must agree within 1 % of a step.
+    pub fn bin_of(&self, other: &Axis) -> Option<(i64, f64)> {
         let begins = ((other.first - self.first) / self.step).round();
-        let close = |a: f64, b: f64| (a - b).abs() <= self.tolerance(other);
         let last = self.first + (begins + (other.bins - 1) as f64) * self.step;
-        let on_bins = close(self.first + begins * self.step, other.first) && close(last, other.at(other.bins - 1));
-        on_bins.then_some(begins as i64)
+        let off = (self.first + begins * self.step - other.first).abs().max((last - other.at(other.bins - 1)).abs());
+        (off <= self.tolerance(other)).then_some((begins as i64, off))
     }
 
     fn tolerance(&self, other: &Axis) -> f64 {
@@ -143,7 +148,10 @@ mod tests {
         for print in [|v: f64| format!("{v:.1}"), |v: f64| format!("{v:.2e}"), |v: f64| format!("{v:.0}")] {
             // whole numbers are too coarse
             match Axis::through(&rows(print)) {
-                Ok(axis) => assert!((axis.step - 0.823).abs() < 1e-3 && exact.bin_of(&axis) == Some(0), "{axis:?}"),
+                Ok(axis) => assert!(
+                    (axis.step - 0.823).abs() < 1e-3 && exact.bin_of(&axis).is_some_and(|at| at.0 == 0),
+                    "{axis:?}"
+                ),
                 Err(fault) => assert!(print(0.5) == "0" && fault.problem.contains("does not increase"), "{fault:?}"),
             }
         }
@@ -155,8 +163,8 @@ mod tests {
     #[test]
     fn axes_on_the_same_bins_may_begin_elsewhere() {
         let axis = Axis { first: -10.0, step: 2.0, bins: 11, rounding: 0.0 };
-        assert_eq!(axis.bin_of(&Axis { bins: 12, ..axis }), Some(0));
-        assert_eq!(axis.bin_of(&axis.moved(-4.0)), Some(-2));
+        assert_eq!(axis.bin_of(&Axis { bins: 12, ..axis }), Some((0, 0.0)));
+        assert_eq!(axis.bin_of(&axis.moved(-4.0)), Some((-2, 0.0)));
         assert_eq!(axis.bin_of(&axis.moved(0.7)), None);
         assert!((axis.place(&axis.moved(0.7)).unwrap() - 0.35).abs() < 1e-12);
         assert_eq!(axis.place(&Axis { step: 1.9, ..axis }), None);

@@ -14,7 +14,7 @@
 
 use super::names::{self, Columns};
 use super::row::{Fault, fault, shown};
-use crate::data::io::table::{Line, Lines, Separator, add_units, is_below_names, number, readings};
+use crate::data::io::table::{Line, Lines, Separator, add_units, all_readings, is_below_names, number, readings};
 
 /// How many rows a line before them announces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,8 +94,7 @@ fn is_usual(cells: &[&str]) -> bool {
 
 /// Whether a line names the columns.
 fn is_named(Line { text, .. }: Line) -> bool {
-    let all = (3..=cells(text).len().max(3)).flat_map(|count| readings(text, count));
-    all.into_iter().any(|names| names::columns(&names).is_ok())
+    all_readings(text, 3..=usize::MAX).iter().any(|names| names::columns(names).is_ok())
 }
 
 /// The columns of rows of so many cells by the line that names them: the last title, which must where a mark parts

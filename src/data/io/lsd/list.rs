@@ -96,7 +96,7 @@ const SEPARATORS: [Separator; 4] = [Separator::Blanks, Separator::Tab, Separator
 /// times among them: comments above other lists are none.
 fn named(line: &str, is_comment: bool) -> Option<Places> {
     const MOST: usize = 12;
-    (2..=MOST).flat_map(|columns| table::readings(line, columns)).find_map(|columns| {
+    table::all_readings(line, 2..=MOST).iter().find_map(|columns| {
         let is_name = |bare: &str| NAMES.iter().any(|names| names.contains(&bare));
         let is_exposure = |bare: &str| NAMES[3].contains(&bare);
         if is_comment

@@ -29,7 +29,7 @@ impl Digits {
     /// Those of a number as it stands in its file.
     pub fn of(cell: &str) -> Self {
         let (mantissa, exponent) = cell.split_once(['e', 'E', 'd', 'D']).unwrap_or((cell, "0"));
-        let exponent: i32 = exponent.parse().unwrap_or(0);
+        let exponent = exponent.parse().map_or(0, |exponent: i32| exponent.clamp(-999, 999));
         let decimals = mantissa.split_once('.').map_or(0, |(_, behind)| behind.len() as i32);
         let digits = mantissa.chars().filter(char::is_ascii_digit);
         let significant = digits.skip_while(|digit| *digit == '0').count() as i32;

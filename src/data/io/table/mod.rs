@@ -10,7 +10,7 @@ mod number;
 
 pub use cells::Separator;
 pub use encoding::{NotText, text};
-pub use names::{Name, add_units, bare, is_below_names, readings};
+pub use names::{Name, add_units, all_readings, bare, is_below_names, readings};
 pub use number::{has_decimal_comma, is_dashes, is_missing, number};
 
 /// Marks that begin a comment.

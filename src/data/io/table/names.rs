@@ -2,6 +2,7 @@
 
 use super::cells::Separator;
 use super::number::{is_dashes, number};
+use std::ops::RangeInclusive;
 
 /// The name of a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,6 +34,11 @@ pub fn bare(text: &str) -> String {
 /// The ways to read a line as the names of so many columns, the plain ones first: words by any separator, words in
 /// brackets being units of the one before, or words that two blanks part.
 pub fn readings(line: &str, columns: usize) -> Vec<Vec<Name>> {
+    all_readings(line, columns..=columns)
+}
+
+/// The same of any number of columns in a range, fewer first.
+pub fn all_readings(line: &str, columns: RangeInclusive<usize>) -> Vec<Vec<Name>> {
     let split = |separator: Separator| separator.cells(line).into_iter().map(str::to_owned).collect();
     let [blanks, tab, comma, semicolon]: [Vec<String>; 4] =
         [Separator::Blanks, Separator::Tab, Separator::Comma, Separator::Semicolon].map(split);
@@ -42,10 +48,11 @@ pub fn readings(line: &str, columns: usize) -> Vec<Vec<Name>> {
     let mut all: Vec<Vec<Name>> = Vec::new();
     for words in [blanks, tab, comma, semicolon, with_units, wide] {
         let names: Vec<Name> = words.iter().map(|word| Name::of(word)).collect();
-        if names.len() == columns && !all.contains(&names) {
+        if columns.contains(&names.len()) && !all.contains(&names) {
             all.push(names);
         }
     }
+    all.sort_by_key(Vec::len);
     all
 }
 
@@ -54,7 +61,7 @@ fn with_units(words: &[String]) -> Vec<String> {
     let (mut joined, mut depth): (Vec<String>, i32) = (Vec::new(), 0);
     for word in words {
         match joined.last_mut().filter(|_| depth > 0 || word.starts_with(['(', '[', '{'])) {
-            Some(before) => *before = format!("{before} {word}"),
+            Some(before) => before.extend([" ", word]),
             None => joined.push(word.clone()),
         }
         depth += word.chars().map(|c| i32::from("([{".contains(c)) - i32::from(")]}".contains(c))).sum::<i32>();
