@@ -354,11 +354,7 @@ impl Campaign {
 
 /// The config's observations with the field that fits them, without a planet.
 fn taken(config: &Config) -> Result<Taken, CampaignError> {
-    let mut scene = Scene::new(config)?;
-    // a star observed with one spectrograph alone is as its config says
-    if scene.settings.sets.len() > 1 || !scene.settings.light_curves.is_empty() {
-        scene = fitted(scene, &|_| ());
-    }
+    let scene = fitted(Scene::new(config)?, &|_| ());
     let known = scene.surface().field.unwrap_or_default();
     let mut values = scene.settings.values;
     values.set(Parameter::K, 0.0);
