@@ -113,7 +113,7 @@ fn main() {
     for seed in 1..=number {
         let begin = Instant::now();
         let config = star(seed);
-        let campaign = Campaign::of(&config, &[]).expect("a campaign").remove(0);
+        let campaign = Campaign::of(&config, &[], &|_| ()).expect("a campaign").remove(0);
         let range = range_d(std::slice::from_ref(&campaign), FrequencySettings::default()).expect("periods");
         let prot = campaign.imager.star.rotation_period_d;
         let periods = compared_d(std::slice::from_ref(&campaign), range);

@@ -369,8 +369,9 @@ fn names_of_tables(tables: &[PathBuf], otherwise: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for (k, path) in tables.iter().enumerate() {
         let name = plain(&path.file_stem().unwrap_or_default().to_string_lossy());
-        let unique = name.filter(|name| !names.contains(name));
-        names.push(unique.unwrap_or_else(|| format!("{otherwise}{}", k + 1)));
+        let is_free = |name: &String| names.iter().all(|other| !other.eq_ignore_ascii_case(name));
+        let numbered = || (k + 1..).map(|number| format!("{otherwise}{number}")).find(is_free);
+        names.extend(name.filter(is_free).or_else(numbered));
     }
     names
 }

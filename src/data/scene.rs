@@ -250,6 +250,20 @@ impl Scene {
         }
     }
 
+    /// Slopes (km/s/d) of the drifts by those of `before`, of which a data set of a single profile has none.
+    fn slopes_of(&self, before: &Imager, kms_d: &[f64]) -> Vec<f64> {
+        if kms_d.is_empty() {
+            return Vec::new();
+        }
+        let with_drifts = |imager: &Imager| match imager.drifts.is_empty() {
+            true => imager.clone().with_drifts(false).drifts,
+            false => imager.drifts.clone(),
+        };
+        let known: Vec<_> = with_drifts(before).into_iter().map(|drift| drift.set).zip(kms_d).collect();
+        let of = |set| known.iter().find(|(of, _)| *of == set).map_or(0.0, |(_, kms_d)| **kms_d);
+        with_drifts(&self.imager).into_iter().map(|drift| of(drift.set)).collect()
+    }
+
     /// The same with drifts held at slopes that were found.
     fn with_drift(mut self, kms_d: &[f64]) -> Self {
         if !kms_d.is_empty() {
@@ -316,7 +330,8 @@ impl Scene {
         let before = Calibrated { observations, sha256, measured, chi2_target, imager, indicators };
         let Measured { star, drift_kms_d, sets, .. } = self.measured.clone();
         let scene = Scene::calibrated(settings.clone(), Arc::clone(data), before.of_others(settings, parts)?);
-        let scene = scene.with_drift(&drift_kms_d).with_contrasts(&sets);
+        let slopes = scene.slopes_of(&self.imager, &drift_kms_d);
+        let scene = scene.with_drift(&slopes).with_contrasts(&sets);
         Ok(match star {
             Some(star) => scene.with_star(star),
             None => scene,

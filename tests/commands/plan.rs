@@ -213,6 +213,10 @@ fn two_spectrographs_and_a_light_curve_are_planned() {
     let said = plan(&desk, &["--next", "3", "--period-d", "4.9", "--out", "both"]);
     says(&said, &["of S/N 900 planned in 5 nights", "plan[1].photometry: ", "3 of 10 nights"]);
     let both = schedule("both");
+    let light = both["light_curves"].as_array().unwrap();
+    let known = light.iter().map(|curve| (curve["name"].as_str().unwrap(), curve["planned"].as_bool().unwrap()));
+    assert_eq!(known.collect::<Vec<_>>(), [("tess", false), ("plan[1].photometry", true)]);
+    assert!(desk.json("both/plan.json")["measured"]["sets"][1]["zero_point"].is_object(), "what was fitted is told");
     assert_eq!(both["next"]["chosen"][0]["set"], "blue", "the better profiles");
     assert_eq!(number(&both["next"]["now"]["sigma_k_kms"]), number(&red["next"]["now"]["sigma_k_kms"]));
     desk.succeed(&["plot", "both"]);
@@ -224,6 +228,7 @@ fn two_spectrographs_and_a_light_curve_are_planned() {
         says(&Desk::new(config).refusal(&["plan", "config.json", "--out", "a"]), parts);
     };
     faulty("/plan/1", json!({ "set": "green" }), &["config.json: plan[1].set: \"green\" is not there: blue, red"]);
+    faulty("/plan/1", json!({}), &["config.json: plan[1].set: red is planned in plan[0] already"]);
     let light = json!({ "photometry": { "name": "kepler", "cadence_d": 0.1, "sigma": 1e-3 } });
     faulty("/plan/0", light, &["plan[0].photometry.name: \"kepler\"", "tess"]);
     let light = json!({ "photometry": { "cadence_d": 0, "sigma": 1e-3 } });

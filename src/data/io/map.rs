@@ -264,7 +264,19 @@ impl MapResult<'_> {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
-        write_set(folder, &|stage| self.fill(stage))
+        write_set(folder, &|stage| self.fill(stage))?;
+        // of earlier maps, which had what these have not
+        let files = files(self.maps);
+        for name in [LIGHT_CURVES, INDICATORS].into_iter().filter(|name| !files.contains(name)) {
+            let path = folder.join(name);
+            match std::fs::remove_file(&path) {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(WriteError { path, source });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     fn fill(&self, folder: &Path) -> Result<(), WriteError> {

@@ -23,7 +23,7 @@ use crate::surface::{Known, NoFit};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Usual spots: medians of the fields that were fitted to simulated stars of nine kinds, hard-edged spots that live
@@ -78,6 +78,17 @@ pub struct SetRecord {
     pub snr: Option<f64>,
 }
 
+/// A light curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LightRecord {
+    /// Its name; of one that goes with planned profiles its key.
+    pub name: String,
+    /// Its bins.
+    pub bins: usize,
+    /// Whether it is still to be taken.
+    pub planned: bool,
+}
+
 /// Where the spots that are integrated out are from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -116,10 +127,12 @@ pub enum CampaignError {
         source: NoFit,
     },
     /// More nights are asked for than there are.
-    #[error("--nights {wanted}: {} lists {listed} nights", path.display())]
+    #[error("--nights {wanted}: {}: {key} lists {listed} nights", path.display())]
     Nights {
         /// The config.
         path: PathBuf,
+        /// The key of its nights.
+        key: String,
         /// Nights asked for.
         wanted: usize,
         /// Nights of the config.
@@ -152,9 +165,11 @@ struct Ahead {
 impl Campaign {
     /// The campaign that `config` asks for, or one for each of these numbers of `nights` (of a season).
     ///
+    /// `report` is told what is under way.
+    ///
     /// # Errors
     /// [`CampaignError`].
-    pub fn of(config: &Config, nights: &[usize]) -> Result<Vec<Self>, CampaignError> {
+    pub fn of(config: &Config, nights: &[usize], report: &dyn Fn(&str)) -> Result<Vec<Self>, CampaignError> {
         let own = config.settings()?;
         // whatever the config's own objective: a plan integrates maps out
         let config = &config
@@ -170,7 +185,7 @@ impl Campaign {
         let taken = match (settings.plan.is_empty(), simulated) {
             (true, true) => None,
             (true, false) => return Err(own.fault("plan", "missing: when is the star to be observed next?").into()),
-            (false, _) => Some(taken(config)?),
+            (false, _) => Some(taken(config, report)?),
         };
         let wanted: Vec<Option<usize>> = match nights {
             [] => vec![None],
@@ -189,16 +204,15 @@ impl Campaign {
         let data = if taken.is_some() { None } else { Some(Dataset::read(&settings)?) };
         let mut ahead: Vec<Ahead> = match (taken, &data) {
             (Some(Taken { scene, .. }), _) => {
-                settings.plan.iter().map(|plan| next(plan, scene, own)).collect::<Result<_, _>>()?
+                settings.plan.iter().map(|plan| next(plan, scene, own, wanted)).collect::<Result<_, _>>()?
             }
             (None, data) => data.iter().flat_map(|data| simulated(&settings, data)).collect(),
         };
-        for (ahead, _) in ahead.iter_mut().zip(listed(config)).filter(|(_, is_listed)| *is_listed) {
-            let Some(wanted) = wanted else { continue };
-            if wanted > ahead.nights.len() {
-                return Err(CampaignError::Nights { path: own.path.clone(), wanted, listed: ahead.nights.len() });
+        if let (None, Some(wanted)) = (taken, wanted) {
+            for (s, _) in listed(config).into_iter().enumerate().filter(|(_, is_listed)| *is_listed) {
+                let key = format!("{}.simulate.cycles", settings.sets[s].key);
+                ahead[s].truncate(wanted, &own.path, key)?;
             }
-            ahead.truncate(wanted);
         }
         let mut parts = match taken {
             Some(Taken { scene, .. }) => of_sets(&scene.imager, &scene.observations),
@@ -270,7 +284,7 @@ impl Campaign {
                 data_sha256,
                 config_sha256: own.sha256.clone(),
                 config: own.resolved.clone(),
-                measured: Measured::default(),
+                measured: taken.map_or_else(Measured::default, |taken| taken.scene.measured.clone()),
             },
             imager,
             settings,
@@ -303,6 +317,17 @@ impl Campaign {
     pub(super) fn set_of(&self, night: usize) -> Option<&str> {
         let is_its = |of: &Range<usize>| of.contains(&self.nights[night][0]);
         Some(&self.sets.get(self.imager.profiles_of_sets().iter().position(is_its)?)?.name)
+    }
+
+    /// The light curves.
+    pub fn light_curves(&self) -> Vec<LightRecord> {
+        let mut first = self.imager.profiles().count();
+        let record = |curve: &LightCurve| {
+            let (place, bins) = (first, curve.bins.len());
+            first += bins;
+            LightRecord { name: curve.name.clone(), bins, planned: !self.known.contains(&place) }
+        };
+        self.imager.light_curves.iter().map(record).collect()
     }
 
     /// Number of profiles that have been taken.
@@ -353,8 +378,8 @@ impl Campaign {
 }
 
 /// The config's observations with the field that fits them, without a planet.
-fn taken(config: &Config) -> Result<Taken, CampaignError> {
-    let scene = fitted(Scene::new(config)?, &|_| ());
+fn taken(config: &Config, report: &dyn Fn(&str)) -> Result<Taken, CampaignError> {
+    let scene = fitted(Scene::new(config)?, report);
     let known = scene.surface().field.unwrap_or_default();
     let mut values = scene.settings.values;
     values.set(Parameter::K, 0.0);
@@ -380,10 +405,15 @@ impl Ahead {
         Ahead { set, profiles, nights, light: None }
     }
 
-    /// Leaves the first nights.
-    fn truncate(&mut self, nights: usize) {
+    /// Leaves the first nights; `key` is where all are listed.
+    fn truncate(&mut self, nights: usize, path: &Path, key: String) -> Result<(), CampaignError> {
+        if nights > self.nights.len() {
+            let (wanted, listed) = (nights, self.nights.len());
+            return Err(CampaignError::Nights { path: path.into(), key, wanted, listed });
+        }
         let kept = self.nights[..nights].iter().flatten().map(|k| self.profiles[*k].clone());
-        *self = Ahead { light: self.light.take(), ..Ahead::new(self.set, kept.collect(), None) };
+        *self = Ahead::new(self.set, kept.collect(), None);
+        Ok(())
     }
 }
 
@@ -452,7 +482,8 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
             }
             Some(numbers) => {
                 let path = config.settings()?.path;
-                return Err(CampaignError::Nights { path, wanted, listed: numbers.len() });
+                let key = format!("{key}{}.schedule.on_nights", inner.replace('/', "."));
+                return Err(CampaignError::Nights { path, key, wanted, listed: numbers.len() });
             }
         }
     }
@@ -461,7 +492,7 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
 
 /// Planned profiles like those that have been taken with their data set: bins of the last of these, and a median error
 /// where no signal-to-noise ratio is planned.
-fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings) -> Result<Ahead, ConfigError> {
+fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings, wanted: Option<usize>) -> Result<Ahead, CampaignError> {
     let PlannedProfiles { key, set, band, section } = plan;
     let taken = &scene.observations.profiles[scene.imager.profiles_of(*set)];
     let last_d = scene.observations.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -480,7 +511,7 @@ fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings) -> Result<Ahead, 
                 "time {first_d} is no Julian date from 1900 to 2100: give the Julian date of time 0, as 2400000.5 for \
                 MJD or 2457000 for BTJD"
             );
-            return Err(own.fault(&format!("{key}.site.time_zero_jd"), &problem));
+            return Err(own.fault(&format!("{key}.site.time_zero_jd"), &problem).into());
         }
         (None, Some(site)) => section.schedule.times_within(first_d, &|begin_d| {
             let [from, to] = site.window_d(begin_d)?;
@@ -490,15 +521,18 @@ fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings) -> Result<Ahead, 
     let before = times_d.iter().copied().find(|time_d| *time_d <= last_d);
     if let Some(time_d) = before.filter(|_| section.times_d.is_some()) {
         let problem = format!("{time_d} is not after the last profile ({last_d}): give coming nights");
-        return Err(own.fault(&format!("{key}.times_d"), &problem));
+        return Err(own.fault(&format!("{key}.times_d"), &problem).into());
     }
     if times_d.is_empty() {
         let problem = "in none of the nights is the star high enough while it is dark: another first_d, or a lower \
             min_altitude_deg";
-        return Err(own.fault(&format!("{key}.site"), problem));
+        return Err(own.fault(&format!("{key}.site"), problem).into());
     }
     let site = section.site.as_ref().filter(|_| section.times_d.is_none());
     let mut ahead = Ahead::new(*set, times_d.into_iter().map(profile).collect(), site);
+    if let (Some(wanted), Some(_)) = (wanted, &section.times_d) {
+        ahead.truncate(wanted, &own.path, format!("{key}.times_d"))?;
+    }
     if let Some(PlannedLight { cadence_d, sigma, .. }) = section.photometry {
         let ends = |[a, b]: [f64; 2], profile: &Profile| [a.min(profile.time_d), b.max(profile.time_d)];
         let ends = ahead.profiles.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
@@ -506,7 +540,9 @@ fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings) -> Result<Ahead, 
         let times_d = at_cadence(own, &key, cadence_d, ends)?;
         let width_d = bin_width_d(std::slice::from_ref(&times_d), scene.imager.star.rotation_period_d);
         let fluxes: Vec<Flux> = times_d.iter().map(|time_d| Flux { time_d: *time_d, flux: 1.0, sigma }).collect();
-        ahead.light = Some(LightCurve::new(&key, *band, &fluxes, width_d, SEGMENT_GAP_D));
+        // measurements farther apart are no segments of their own
+        let gap_d = SEGMENT_GAP_D.max(1.5 * cadence_d);
+        ahead.light = Some(LightCurve::new(&key, *band, &fluxes, width_d, gap_d));
     }
     Ok(ahead)
 }

@@ -1,6 +1,6 @@
 //! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
 
-use super::{Aim, Campaign, Choice, Expected, Outlook, PlanSettings, SetRecord, SpotsSource};
+use super::{Aim, Campaign, Choice, Expected, LightRecord, Outlook, PlanSettings, SetRecord, SpotsSource};
 use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
@@ -69,9 +69,9 @@ pub struct ScheduleRecord {
     /// The data sets, if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<SetRecord>,
-    /// Bins of each light curve by its name, planned ones among them.
+    /// The light curves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub light_curves: Vec<(String, usize)>,
+    pub light_curves: Vec<LightRecord>,
     /// The spots that are integrated out.
     pub spots: SpotsRecord,
     /// Delta ln L of a detection, after all nights.
@@ -208,6 +208,10 @@ impl PlanFile {
             text += "\n";
         }
         text += &best.table();
+        // of the first config alone
+        for (label, line) in self.provenance.measured.lines().into_iter().filter(|_| !several) {
+            text += &format!("{label}: {line}\n");
+        }
         text += "\n";
         for sentence in best.sentences(self.false_alarm_probability) {
             text += &format!("{sentence}\n");
@@ -266,7 +270,7 @@ impl ScheduleRecord {
             rotation_period_d: prot,
             snr: 1.0 / campaign.sigma,
             sets: campaign.sets.clone(),
-            light_curves: campaign.imager.light_curves.iter().map(|of| (of.name.clone(), of.bins.len())).collect(),
+            light_curves: campaign.light_curves(),
             spots: SpotsRecord {
                 source: campaign.source,
                 spot_amplitude: spectrum.amplitude,
@@ -302,8 +306,8 @@ impl ScheduleRecord {
             let snr = snr.map_or_else(String::new, |snr| format!(" of S/N {snr:.0}"));
             text += &format!("{name}: {taken} profiles taken, {planned}{snr} planned in {nights} nights\n");
         }
-        for (name, bins) in &self.light_curves {
-            text += &format!("{name}: {bins} bins\n");
+        for LightRecord { name, bins, planned } in &self.light_curves {
+            text += &format!("{name}: {bins} bins{}\n", if *planned { " planned" } else { "" });
         }
         text.push('\n');
         let head = ["nights", "profiles", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();

@@ -100,7 +100,7 @@ impl Forecast {
         let mut campaigns = Vec::new();
         for config in configs {
             report(&format!("reading {}", shown(config.path())));
-            campaigns.extend(Campaign::of(config, nights)?);
+            campaigns.extend(Campaign::of(config, nights, report)?);
         }
         let aims = next.map(|next| campaigns.iter().map(|campaign| next.aim(campaign)).collect::<Result<Vec<_>, _>>());
         let aims = aims.transpose().map_err(CampaignError::from)?;

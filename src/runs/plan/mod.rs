@@ -15,7 +15,7 @@ mod file;
 mod forecast;
 mod outlook;
 
-pub use campaign::{Campaign, CampaignError, SetRecord, SpotsSource};
+pub use campaign::{Campaign, CampaignError, LightRecord, SetRecord, SpotsSource};
 pub use choice::{Aim, Choice, ChosenNight, Merit};
 pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
 pub use forecast::{Forecast, ForecastError, Next};
@@ -30,7 +30,7 @@ use std::time::Instant;
 /// Periods over which schedules are compared, even in their logarithm.
 const COMPARED: usize = 60;
 
-/// Profiles of the largest campaign: some minutes, and 1 GB.
+/// Profiles and bins of light curves of the largest campaign: some minutes, and 1 GB.
 const MOST_PROFILES: usize = 1000;
 
 /// How often the growing campaign is looked at.
@@ -62,8 +62,8 @@ pub enum PlanError {
     },
     /// More profiles than can be looked at in reasonable time and memory.
     #[error(
-        "{name}: {profiles} profiles; time and memory of a plan grow with their square, and {MOST_PROFILES} are the \
-        most: fewer --nights, or fewer exposures per_night"
+        "{name}: {profiles} profiles and bins of light curves; time and memory of a plan grow with their square, and \
+        {MOST_PROFILES} are the most: fewer --nights, fewer exposures per_night, or no photometry over so long a time"
     )]
     TooLong {
         /// The schedule.
@@ -101,7 +101,7 @@ pub fn outlook(
     settings: &PlanSettings,
     report: &dyn Fn(&str),
 ) -> Result<Vec<Outlook>, PlanError> {
-    let profiles = campaign.all().len();
+    let profiles = campaign.imager.times_of_all_d().len();
     if profiles > MOST_PROFILES {
         return Err(PlanError::TooLong { name: campaign.name.clone(), profiles });
     }

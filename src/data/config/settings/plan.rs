@@ -34,6 +34,12 @@ pub(super) fn resolve_plan(
         check_plan(plan, &key)?;
         let names: Vec<&str> = sets.iter().map(|set| &*set.name).collect();
         let set = named(plan.set.as_deref(), &names, &format!("{key}.set"))?.unwrap_or(0);
+        let is_same = |other: &PlanSection| named(other.set.as_deref(), &names, &key).is_ok_and(|of| of == Some(set));
+        if let Some(other) = plans.sections[..p].iter().position(is_same) {
+            let problem =
+                format!("{} is planned in {} already: one section for each data set", names[set], plans.key(other));
+            return Err(Fault::new(format!("{key}.set"), problem));
+        }
         let names: Vec<&str> = curves.iter().map(|curve| &*curve.name).collect();
         let name = plan.photometry.as_ref().and_then(|light| light.name.as_deref());
         let curve = named(name, &names, &format!("{key}.photometry.name"))?;
