@@ -474,7 +474,11 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
     let Some(wanted) = wanted else { return Ok(config.clone()) };
     let (key, inner) = place(config);
     let mut part = config.get(key).cloned().unwrap_or_default();
-    for section in sections(&mut part, inner).into_iter().filter(|section| !lists_times(section)) {
+    let several = part.is_array();
+    for (s, section) in sections(&mut part, inner).into_iter().enumerate() {
+        if lists_times(section) {
+            continue;
+        }
         match section.pointer("/schedule/on_nights").and_then(Value::as_array) {
             None => section["schedule"]["nights"] = wanted.into(),
             Some(numbers) if wanted <= numbers.len() => {
@@ -482,7 +486,8 @@ fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Campaig
             }
             Some(numbers) => {
                 let path = config.settings()?.path;
-                let key = format!("{key}{}.schedule.on_nights", inner.replace('/', "."));
+                let number = if several { format!("[{s}]") } else { String::new() };
+                let key = format!("{key}{number}{}.schedule.on_nights", inner.replace('/', "."));
                 return Err(CampaignError::Nights { path, key, wanted, listed: numbers.len() });
             }
         }
