@@ -34,7 +34,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let to_begin = stars.iter().filter(|star| !star.folder.exists());
     note_objective(&to_begin.filter_map(|star| Config::load(&star.config).ok()).collect::<Vec<_>>());
     let output = Output::to(args.folder.clone(), true);
-    let folder = output.create()?;
+    drop(output.create()?);
+    let folder = output.folder();
+    // a file is locked also where folders cannot be
     let held = lines::hold_for(&folder.join(LOCK)).map_err(|error| match error {
         JournalError::Locked { .. } => {
             Failure::failed(format!("--out {}: another `dimcmc batch` is at work there", folder.display()))

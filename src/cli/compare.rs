@@ -38,6 +38,6 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     signals.defer();
     let folder = args.output.create()?;
     write_json(&folder.join(FILE), &comparison)?;
-    console::line(format_args!("{}written: {}: {FILE}", comparison.table(), shown(folder)));
+    console::line(format_args!("{}written: {}: {FILE}", comparison.table(), shown(&folder)));
     Ok(())
 }

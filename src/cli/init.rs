@@ -7,7 +7,7 @@ use crate::data::config::{ConfigError, IndicatorSection, Spectrograph};
 use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, LightCurve, List, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
-use crate::data::io::{FileError, atomic, lsd};
+use crate::data::io::{FileError, lsd};
 use crate::numerics::text::shown;
 use crate::star::BrightnessModel;
 use crate::surface::ObjectiveKind;
@@ -251,7 +251,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = proposal?;
     args.output.check(None)?;
     signals.defer();
-    atomic::write(args.output.path(), proposal.json.as_bytes())?;
+    args.output.write(args.output.path(), &proposal.json)?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));
     next_commands(&proposal, args.output.path());
     Ok(())

@@ -54,10 +54,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let injected = Injected::of(&scene, Orbit { k_kms, porb_over_prot, phi })?;
     signals.defer();
     let folder = args.output.create()?;
-    injected.write(folder)?;
+    injected.write(&folder)?;
     let lines = injected.lines().into_iter();
     let report = lines.fold(Report::default(), |report, (label, text)| report.line(label, text));
     let where_to = if scene.settings.sets.len() > 1 { " of each data set in a folder of its name" } else { "" };
-    report.written(folder, format!("{CONFIG}, observations.txt, p000.prof ... and truth.json{where_to}")).print();
+    report.written(&folder, format!("{CONFIG}, observations.txt, p000.prof ... and truth.json{where_to}")).print();
     Ok(())
 }

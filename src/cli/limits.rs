@@ -99,8 +99,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         error => Failure::limits(&args.config, error),
     })?;
     let folder = args.output.create()?;
-    found.write(folder)?;
-    console::line(format_args!("{}written: {}: {CSV}, {JSON}", found.table(), text::shown(folder)));
+    found.write(&folder)?;
+    console::line(format_args!("{}written: {}: {CSV}, {JSON}", found.table(), text::shown(&folder)));
     Ok(())
 }
 

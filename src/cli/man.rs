@@ -25,7 +25,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     for (name, page) in &pages {
         atomic::write(&folder.join(name), page)?;
     }
-    console::line(format_args!("written: {}: {} pages, dimcmc.1 first", shown(folder), pages.len()));
+    console::line(format_args!("written: {}: {} pages, dimcmc.1 first", shown(&folder), pages.len()));
     Ok(())
 }
 

@@ -43,8 +43,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let maps = maps.map_err(Failure::maps)?;
     signals.defer();
     let folder = args.output.create()?;
-    maps.write(folder)?;
+    maps.write(&folder)?;
     let report = maps.lines().into_iter().fold(Report::default(), |report, (label, text)| report.line(label, text));
-    report.written(folder, maps.files().join(", ")).print();
+    report.written(&folder, maps.files().join(", ")).print();
     Ok(())
 }

@@ -35,8 +35,8 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     let merged = merge(&args.runs).map_err(failure)?;
     signals.defer();
     let folder = args.output.create()?;
-    merged.write(folder, args.output.replaces()).map_err(failure)?;
-    analyse::report(folder, &merged.manifest, &merged.chain)?;
+    merged.write(&folder, args.output.replaces()).map_err(failure)?;
+    analyse::report(&folder, &merged.manifest, &merged.chain)?;
     for (run, beyond) in args.runs.iter().zip(&merged.beyond).filter(|(_, beyond)| **beyond > 0) {
         let shortest = merged.chain.steps() - 1;
         console::line(format_args!(

@@ -34,7 +34,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let file = OptimumFile::new(&scene, &found);
     signals.defer();
     let folder = args.output.create()?;
-    file.write(folder)?;
+    file.write(&folder)?;
     console::print(file.table());
     Ok(())
 }

@@ -5,10 +5,12 @@
 
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
-use crate::data::io::atomic::{clear_abandoned, folder_of};
+use crate::data::io::atomic::{self, WriteError, clear_abandoned, folder_of};
 use crate::data::scene::{Scene, SceneError};
 use crate::runs::{fitted, grid_scan, run};
+use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 /// The observations of a config, after a note on its assumed objective.
@@ -127,11 +129,32 @@ impl Output {
     }
 
     /// The folder, created if need be.
-    pub fn create(&self) -> Result<&Path, Failure> {
-        self.check()?;
-        let failed = |e| Failure::failed(format!("--out {}: cannot be created: {e}", self.folder.display()));
+    pub fn create(&self) -> Result<Claimed<'_>, Failure> {
+        let folder = self.folder.display();
+        let failed = |e| Failure::failed(format!("--out {folder}: cannot be created: {e}"));
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
-        Ok(&self.folder)
+        let claimed = Claimed { folder: &self.folder, lock: File::open(&self.folder).ok() };
+        if let Some(Err(TryLockError::WouldBlock)) = claimed.lock.as_ref().map(File::try_lock) {
+            return Err(Failure::failed(format!("--out {folder}: another process is writing there")));
+        }
+        // another may have ended meanwhile
+        self.check()?;
+        Ok(claimed)
+    }
+}
+
+/// A folder into which no other process writes, where the system can lock folders.
+#[derive(Debug)]
+pub struct Claimed<'a> {
+    folder: &'a Path,
+    lock: Option<File>,
+}
+
+impl Deref for Claimed<'_> {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        self.folder
     }
 }
 
@@ -175,6 +198,11 @@ impl ConfigFile {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Writes the config, or the other file that comes with it.
+    pub fn write(&self, file: &Path, text: &str) -> Result<(), WriteError> {
+        atomic::write_over(file, text.as_bytes(), self.force)
     }
 
     /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever

@@ -73,9 +73,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let found = found?;
     signals.defer();
     let folder = args.output.create()?;
-    found.write(folder)?;
+    found.write(&folder)?;
     let (table, files) = (found.table(), found.files().join(", "));
-    console::line(format_args!("{table}written: {}: {files}", shown(folder)));
+    console::line(format_args!("{table}written: {}: {files}", shown(&folder)));
     Ok(())
 }
 

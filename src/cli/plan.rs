@@ -88,7 +88,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let forecast = forecast.map_err(Failure::plan)?;
     signals.defer();
     let folder = args.output.create()?;
-    forecast.write(folder)?;
-    console::line(format_args!("{}\nwritten: {}: {CSV}, {JSON}", forecast.table(), shown(folder)));
+    forecast.write(&folder)?;
+    console::line(format_args!("{}\nwritten: {}: {CSV}, {JSON}", forecast.table(), shown(&folder)));
     Ok(())
 }

@@ -58,11 +58,11 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     let figures = plot::figures(&args.folder, args.run.as_deref())?;
     signals.defer();
     let folder = output.create()?;
-    let files = plot::write(&figures, folder, args.dpi)?;
+    let files = plot::write(&figures, &folder, args.dpi)?;
     let mut report = Report::default();
     for note in figures.iter().flat_map(|figure| &figure.notes) {
         report = report.line("note", note);
     }
-    report.written(folder, files.join(", ")).print();
+    report.written(&folder, files.join(", ")).print();
     Ok(())
 }

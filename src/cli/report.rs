@@ -54,7 +54,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     }
     let page = report::report(&args.folders)?;
     signals.defer();
-    atomic::write(&file, page.as_bytes())?;
+    atomic::write_over(&file, page.as_bytes(), args.force)?;
     Report::default().line("written", file.display()).print();
     Ok(())
 }

@@ -30,7 +30,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.spare(simulated.read(), |name| simulated.writes(name))?;
     signals.defer();
     let folder = args.output.create()?;
-    simulated.write(folder)?;
+    simulated.write(&folder)?;
     let lines = simulated.lines().into_iter();
     let report = lines.fold(Report::default(), |report, (label, text)| report.line(label, text));
     let files = "observations.txt, p000.prof ..., truth.json";
@@ -38,6 +38,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         1 => files.to_owned(),
         _ => format!("of each data set, in a folder of its name: {files}"),
     };
-    report.written(folder, files).print();
+    report.written(&folder, files).print();
     Ok(())
 }

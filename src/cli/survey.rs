@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let survey = Survey::of(&args.folders, &settings)?;
     signals.defer();
     let folder = args.output.create()?;
-    survey.write(folder)?;
-    console::line(format_args!("{}written: {}: {CSV}, {COMPLETENESS}, {JSON}", survey.table(), shown(folder)));
+    survey.write(&folder)?;
+    console::line(format_args!("{}written: {}: {CSV}, {COMPLETENESS}, {JSON}", survey.table(), shown(&folder)));
     Ok(())
 }
