@@ -381,6 +381,7 @@ if __name__ == "__main__":
         calibration_table.under_the_head(args.out, "Kills and full disks", lines)
     elif args.program or args.python:
         args.program = args.program and str(Path(args.program).resolve())
+        args.python = args.python and os.path.abspath(args.python)
         bench, rng = Bench(args), random.Random(args.seed)
         for fault, (start, disturb, names) in FAULTS.items():
             times = getattr(args, fault)

@@ -1,4 +1,4 @@
-//! Quantiles of sorted values.
+//! Quantiles.
 
 /// Quantile `p` of sorted values, linear between them.
 pub fn quantile(sorted: &[f64], p: f64) -> f64 {
@@ -8,9 +8,21 @@ pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
+/// The middle one of some values, of an even number the upper one of two; NaN of none.
+pub fn middle(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_middle_of_few_values() {
+        assert_eq!((middle(vec![4.0, 1.0, 2.0]), middle(vec![3.0, 1.0])), (2.0, 3.0));
+        assert!(middle(Vec::new()).is_nan());
+    }
 
     #[test]
     fn quantiles_of_few_values() {

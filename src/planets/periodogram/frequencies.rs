@@ -6,6 +6,7 @@
 //! (VanderPlas 2018, ApJS 236, 16, section 7.1). Of a gap between seasons 60 d count in that T. Where profiles stand at
 //! about even distances the periods shorter than twice the median spacing are mere reflections: the search ends there.
 
+use crate::numerics::quantile::middle;
 use serde::{Deserialize, Serialize};
 
 /// The shortest period is that of this many average Nyquist frequencies.
@@ -145,12 +146,11 @@ impl Sampling {
         if times.len() < 3 {
             return Err(FrequencyError::TooFewTimes(times.len()));
         }
-        let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        spacings.sort_by(f64::total_cmp);
+        let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let time_base = times[times.len() - 1] - times[0];
         let beyond: f64 = spacings.iter().map(|spacing| (spacing - longest_gap).max(0.0)).sum();
         let without_gaps = time_base - beyond;
-        let median_spacing = spacings[spacings.len() / 2];
+        let median_spacing = middle(spacings);
         Ok(Sampling { time_base, without_gaps, median_spacing, profiles: times.len() as f64 })
     }
 }

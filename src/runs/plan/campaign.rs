@@ -1,38 +1,32 @@
 //! A star with the times at which it is to be observed.
 
+use super::CampaignError;
+use super::ahead::{self, Ahead};
 use crate::data::calibrated::{fingerprint, imager, light_curves, of_sets, with_light_curves};
-use crate::data::config::{
-    Config, ConfigError, DataSetSettings, LightSource, ObservationSource, PlannedLight, PlannedProfiles, SEGMENT_GAP_D,
-    Settings,
-};
-use crate::data::dataset::{Dataset, ProfileSet, at_cadence};
+use crate::data::config::{Config, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings};
+use crate::data::dataset::Dataset;
 use crate::data::io::provenance::{Measured, Provenance};
-use crate::data::scene::{Scene, SceneError};
-use crate::data::simulate::Site;
+use crate::data::scene::Scene;
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::Parameter;
+use crate::numerics::quantile::middle;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
 use crate::runs::fitted::fitted;
-use crate::star::observation::nights;
-use crate::star::observation::{Observations, Profile};
+use crate::star::observation::Observations;
+use crate::surface::Known;
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::photometry::{Flux, LightCurve, bin_width_d};
+use crate::surface::photometry::LightCurve;
 use crate::surface::planned::{Assumed, Basis, Marginal, Planned, fit};
-use crate::surface::{Known, NoFit};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Usual spots: medians of the fields that were fitted to simulated stars of nine kinds, hard-edged spots that live
 /// from 7 d to for ever (`results/calibration-changing.md`), with a break of the spectrum. Those of LO Peg have 0.25,
 /// 0.94 and 106 d, without one.
 const USUAL: (f64, f64, f64) = (0.22, 1.6, 28.0);
-
-/// Planned profiles that are farther apart (d) are of two nights: those of one night may be hours apart.
-const NIGHT_GAP_D: f64 = 0.5;
 
 /// A star, and when it is observed.
 #[derive(Clone, Debug)]
@@ -112,54 +106,10 @@ impl SpotsSource {
     }
 }
 
-/// Why there is none.
-#[derive(Debug, thiserror::Error)]
-pub enum CampaignError {
-    /// The config or its observations are at fault.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The spots of the observed profiles cannot be integrated out.
-    #[error("{}: no field of spots fits the observed profiles: {source}", path.display())]
-    Field {
-        /// The config.
-        path: PathBuf,
-        /// What is wrong.
-        source: NoFit,
-    },
-    /// More nights are asked for than there are.
-    #[error("--nights {wanted}: {}: {key} lists {listed} nights", path.display())]
-    Nights {
-        /// The config.
-        path: PathBuf,
-        /// The key of its nights.
-        key: String,
-        /// Nights asked for.
-        wanted: usize,
-        /// Nights of the config.
-        listed: usize,
-    },
-}
-
-impl From<ConfigError> for CampaignError {
-    fn from(error: ConfigError) -> Self {
-        CampaignError::Scene(error.into())
-    }
-}
-
 /// What has been taken.
 struct Taken {
     scene: Scene,
     marginal: Arc<Marginal>,
-}
-
-/// What is planned for a data set.
-struct Ahead {
-    set: usize,
-    profiles: Vec<Profile>,
-    /// Numbers of them.
-    nights: Vec<Vec<usize>>,
-    /// What is measured meanwhile.
-    light: Option<LightCurve>,
 }
 
 impl Campaign {
@@ -200,31 +150,19 @@ impl Campaign {
         taken: Option<&Taken>,
         wanted: Option<usize>,
     ) -> Result<Self, CampaignError> {
-        let settings = with_nights(config, wanted)?.settings()?;
+        let settings = ahead::with_nights(config, wanted)?.settings()?;
         let data = if taken.is_some() { None } else { Some(Dataset::read(&settings)?) };
-        let mut ahead: Vec<Ahead> = match (taken, &data) {
-            (Some(Taken { scene, .. }), _) => {
-                settings.plan.iter().map(|plan| next(plan, scene, own, wanted)).collect::<Result<_, _>>()?
-            }
-            (None, data) => data.iter().flat_map(|data| simulated(&settings, data)).collect(),
+        let mut ahead = match (taken, &data) {
+            (Some(Taken { scene, .. }), _) => ahead::planned(scene, &settings, own, wanted)?,
+            (None, Some(data)) => ahead::simulated(config, &settings, data, wanted)?,
+            (None, None) => Vec::new(),
         };
-        if let (None, Some(wanted)) = (taken, wanted) {
-            for (s, _) in listed(config).into_iter().enumerate().filter(|(_, is_listed)| *is_listed) {
-                let key = format!("{}.simulate.cycles", settings.sets[s].key);
-                ahead[s].truncate(wanted, &own.path, key)?;
-            }
-        }
         let mut parts = match taken {
             Some(Taken { scene, .. }) => of_sets(&scene.imager, &scene.observations),
             None => vec![Observations { profiles: Vec::new() }; settings.sets.len()],
         };
         let before: Vec<usize> = parts.iter().map(|part| part.profiles.len()).collect();
-        let mut nights: Vec<(usize, Vec<usize>)> = Vec::new();
-        for ahead in &ahead {
-            let part = &mut parts[ahead.set].profiles;
-            nights.extend(ahead.nights.iter().map(|night| (ahead.set, night.iter().map(|k| part.len() + k).collect())));
-            part.extend(ahead.profiles.iter().cloned());
-        }
+        ahead.iter().for_each(|ahead| parts[ahead.set].profiles.extend(ahead.profiles.iter().cloned()));
         let (mut imager, settings) = match (taken, data) {
             (Some(Taken { scene, .. }), _) => {
                 let scene = scene.with_parts(parts.clone())?;
@@ -237,27 +175,19 @@ impl Campaign {
                 (imager, settings)
             }
         };
-        let places = imager.profiles_of_sets();
-        let times_d = imager.times_d();
-        nights.iter_mut().for_each(|(set, night)| night.iter_mut().for_each(|k| *k += places[*set].start));
-        nights.sort_by(|(_, a), (_, b)| times_d[a[0]].total_cmp(&times_d[b[0]]));
-        let mut known: Vec<usize> = places.iter().zip(&before).flat_map(|(of, n)| of.start..of.start + n).collect();
-        let mut bins = times_d.len()..usize::MAX;
-        for (curve, of) in imager.light_curves.iter().zip(&settings.light_curves) {
-            let own = bins.by_ref().take(curve.bins.len());
-            // one that is simulated beside profiles that are planned is planned, too
-            let is_known = taken.is_some() || matches!(of.source, LightSource::File(_));
-            known.extend(own.filter(|_| is_known));
-        }
+        // one that is simulated beside profiles that are planned is planned, too
+        let is_known = |of: &LightCurveSettings| taken.is_some() || matches!(of.source, LightSource::File(_));
+        let known_light: Vec<bool> = settings.light_curves.iter().map(is_known).collect();
+        let (known, nights) = numbers(&imager, &before, &known_light, &ahead);
         imager.light_curves.extend(ahead.iter_mut().filter_map(|ahead| ahead.light.take()));
         let sigma = |of: &mut dyn Iterator<Item = &Ahead>| {
             let sigmas: Vec<f64> = of.flat_map(|ahead| &ahead.profiles).flat_map(|p| p.sigma.clone()).collect();
-            (!sigmas.is_empty()).then(|| median(sigmas))
+            (!sigmas.is_empty()).then(|| middle(sigmas))
         };
         let record = |(set, of): (usize, &DataSetSettings)| SetRecord {
             name: of.name.clone(),
             taken: before[set],
-            planned: places[set].len() - before[set],
+            planned: parts[set].profiles.len() - before[set],
             nights: nights.iter().filter(|(of, _)| *of == set).count(),
             snr: sigma(&mut ahead.iter().filter(|ahead| ahead.set == set)).map(f64::recip),
         };
@@ -388,44 +318,31 @@ fn taken(config: &Config, report: &dyn Fn(&str)) -> Result<Taken, CampaignError>
     Ok(Taken { scene, marginal: Arc::new(found.marginal) })
 }
 
-impl Ahead {
-    /// Of these profiles of a data set, taken from a place if one is known.
-    fn new(set: usize, profiles: Vec<Profile>, site: Option<&Site>) -> Self {
-        let times_d: Vec<f64> = profiles.iter().map(|profile| profile.time_d).collect();
-        let nights = match site {
-            None => nights(&times_d, NIGHT_GAP_D),
-            // from local noon to noon
-            Some(site) => {
-                let mut order: Vec<usize> = (0..times_d.len()).collect();
-                order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
-                let is_one = |a: &usize, b: &usize| site.night(times_d[*a]) == site.night(times_d[*b]);
-                order.chunk_by(is_one).map(<[usize]>::to_vec).collect()
-            }
-        };
-        Ahead { set, profiles, nights, light: None }
+/// Numbers of what there is before the first night, so many profiles of each data set and the bins of light curves that
+/// are known; and those of planned nights, in the order of time, with their data sets.
+fn numbers(
+    imager: &Imager,
+    before: &[usize],
+    known_light: &[bool],
+    ahead: &[Ahead],
+) -> (Vec<usize>, Vec<(usize, Vec<usize>)>) {
+    let places = imager.profiles_of_sets();
+    let mut known: Vec<usize> = places.iter().zip(before).flat_map(|(of, n)| of.start..of.start + n).collect();
+    let mut next: Vec<usize> = places.iter().zip(before).map(|(of, n)| of.start + n).collect();
+    let mut nights: Vec<(usize, Vec<usize>)> = Vec::new();
+    for ahead in ahead {
+        let first = &mut next[ahead.set];
+        nights.extend(ahead.nights.iter().map(|night| (ahead.set, night.iter().map(|k| *first + k).collect())));
+        *first += ahead.profiles.len();
     }
-
-    /// Leaves the first nights; `key` is where all are listed.
-    fn truncate(&mut self, nights: usize, path: &Path, key: String) -> Result<(), CampaignError> {
-        if nights > self.nights.len() {
-            let (wanted, listed) = (nights, self.nights.len());
-            return Err(CampaignError::Nights { path: path.into(), key, wanted, listed });
-        }
-        let kept = self.nights[..nights].iter().flatten().map(|k| self.profiles[*k].clone());
-        *self = Ahead::new(self.set, kept.collect(), None);
-        Ok(())
+    let times_d = imager.times_d();
+    nights.sort_by(|(_, a), (_, b)| times_d[a[0]].total_cmp(&times_d[b[0]]));
+    let mut bins = times_d.len()..usize::MAX;
+    for (curve, is_known) in imager.light_curves.iter().zip(known_light) {
+        let own = bins.by_ref().take(curve.bins.len());
+        known.extend(own.filter(|_| *is_known));
     }
-}
-
-/// The profiles of each data set of a star that is not yet observed.
-fn simulated(settings: &Settings, data: &Dataset) -> Vec<Ahead> {
-    let of_set = |(set, (of, profiles)): (usize, (&DataSetSettings, &ProfileSet))| {
-        let inflation = of.simulation().map_or(1.0, |simulation| simulation.correlated_bins.sqrt());
-        let mut profiles = profiles.observations.profiles.clone();
-        profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= inflation);
-        Ahead::new(set, profiles, None)
-    };
-    settings.sets.iter().zip(&data.sets).enumerate().map(of_set).collect()
+    (known, nights)
 }
 
 /// A usual field, but for what is known.
@@ -438,121 +355,4 @@ fn usual(known: Known) -> Assumed {
     };
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(lifetime_d));
     Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms: known.jitter_kms.unwrap_or(0.0) }
-}
-
-/// The part of the config that says when profiles are taken, and in which section of it.
-fn place(config: &Config) -> (&'static str, &'static str) {
-    match config.get("plan").is_some_and(|plan| !plan.is_null()) {
-        true => ("plan", ""),
-        false => ("observations", "/simulate"),
-    }
-}
-
-/// Those sections, one for each data set.
-fn sections<'a>(part: &'a mut Value, inner: &str) -> Vec<&'a mut Value> {
-    let all = match part {
-        Value::Array(all) => all.iter_mut().collect(),
-        one => vec![one],
-    };
-    all.into_iter().filter_map(|section| section.pointer_mut(inner)).collect()
-}
-
-/// Whether a section lists times, rather than having a schedule.
-fn lists_times(section: &Value) -> bool {
-    ["times_d", "cycles"].iter().any(|key| section.get(key).is_some_and(|times| !times.is_null()))
-}
-
-/// Of which data sets times are listed.
-fn listed(config: &Config) -> Vec<bool> {
-    let (key, inner) = place(config);
-    let mut part = config.get(key).cloned().unwrap_or_default();
-    sections(&mut part, inner).iter().map(|section| lists_times(section)).collect()
-}
-
-/// The config with that many nights in its schedules.
-fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, CampaignError> {
-    let Some(wanted) = wanted else { return Ok(config.clone()) };
-    let (key, inner) = place(config);
-    let mut part = config.get(key).cloned().unwrap_or_default();
-    let several = part.is_array();
-    for (s, section) in sections(&mut part, inner).into_iter().enumerate() {
-        if lists_times(section) {
-            continue;
-        }
-        match section.pointer("/schedule/on_nights").and_then(Value::as_array) {
-            None => section["schedule"]["nights"] = wanted.into(),
-            Some(numbers) if wanted <= numbers.len() => {
-                section["schedule"]["on_nights"] = numbers[..wanted].to_vec().into();
-            }
-            Some(numbers) => {
-                let path = config.settings()?.path;
-                let number = if several { format!("[{s}]") } else { String::new() };
-                let key = format!("{key}{number}{}.schedule.on_nights", inner.replace('/', "."));
-                return Err(CampaignError::Nights { path, key, wanted, listed: numbers.len() });
-            }
-        }
-    }
-    Ok(config.clone().with(key, part))
-}
-
-/// Planned profiles like those that have been taken with their data set: bins of the last of these, and a median error
-/// where no signal-to-noise ratio is planned.
-fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings, wanted: Option<usize>) -> Result<Ahead, CampaignError> {
-    let PlannedProfiles { key, set, band, section } = plan;
-    let taken = &scene.observations.profiles[scene.imager.profiles_of(*set)];
-    let last_d = scene.observations.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
-    // nights of a place are not those of the time scale
-    let usual_d = if section.site.is_some() { last_d + 1.0 } else { last_d.floor() + 1.0 };
-    let first_d = section.first_d.unwrap_or(usual_d);
-    let usual = median(taken.iter().flat_map(|profile| profile.sigma.clone()).collect());
-    let sigma = section.snr.map_or(usual, f64::recip);
-    let like = &taken[taken.len() - 1];
-    let profile = |time_d: f64| Profile { time_d, sigma: vec![sigma; like.sigma.len()], ..like.clone() };
-    let times_d = match (&section.times_d, &section.site) {
-        (Some(listed), _) => listed.clone(),
-        (None, None) => section.schedule.times_d(first_d),
-        (None, Some(site)) if !site.has_date(first_d) => {
-            let problem = format!(
-                "time {first_d} is no Julian date from 1900 to 2100: give the Julian date of time 0, as 2400000.5 for \
-                MJD or 2457000 for BTJD"
-            );
-            return Err(own.fault(&format!("{key}.site.time_zero_jd"), &problem).into());
-        }
-        (None, Some(site)) => section.schedule.times_within(first_d, &|begin_d| {
-            let [from, to] = site.window_d(begin_d)?;
-            Some((from, to - from))
-        }),
-    };
-    let before = times_d.iter().copied().find(|time_d| *time_d <= last_d);
-    if let Some(time_d) = before.filter(|_| section.times_d.is_some()) {
-        let problem = format!("{time_d} is not after the last profile ({last_d}): give coming nights");
-        return Err(own.fault(&format!("{key}.times_d"), &problem).into());
-    }
-    if times_d.is_empty() {
-        let problem = "in none of the nights is the star high enough while it is dark: another first_d, or a lower \
-            min_altitude_deg";
-        return Err(own.fault(&format!("{key}.site"), problem).into());
-    }
-    let site = section.site.as_ref().filter(|_| section.times_d.is_none());
-    let mut ahead = Ahead::new(*set, times_d.into_iter().map(profile).collect(), site);
-    if let (Some(wanted), Some(_)) = (wanted, &section.times_d) {
-        ahead.truncate(wanted, &own.path, format!("{key}.times_d"))?;
-    }
-    if let Some(PlannedLight { cadence_d, sigma, .. }) = section.photometry {
-        let ends = |[a, b]: [f64; 2], profile: &Profile| [a.min(profile.time_d), b.max(profile.time_d)];
-        let ends = ahead.profiles.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
-        let key = format!("{key}.photometry");
-        let times_d = at_cadence(own, &key, cadence_d, ends)?;
-        let width_d = bin_width_d(std::slice::from_ref(&times_d), scene.imager.star.rotation_period_d);
-        let fluxes: Vec<Flux> = times_d.iter().map(|time_d| Flux { time_d: *time_d, flux: 1.0, sigma }).collect();
-        // measurements farther apart are no segments of their own
-        let gap_d = SEGMENT_GAP_D.max(1.5 * cadence_d);
-        ahead.light = Some(LightCurve::new(&key, *band, &fluxes, width_d, gap_d));
-    }
-    Ok(ahead)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

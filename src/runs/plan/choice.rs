@@ -8,6 +8,7 @@ use super::{Campaign, PlanError, PlanSettings};
 use crate::data::ephemeris::ephemerides;
 use crate::field::FieldError;
 use crate::model::Ephemeris;
+use crate::numerics::quantile::middle;
 use crate::planets::periodogram::orbits::{at, between};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::surface::expansion::nuisances;
@@ -227,11 +228,7 @@ pub fn choose(
         draws.extend((1..=count).map(|n| order[..n].to_vec()));
     }
     let at_random = weighed.sigmas(&draws).map_err(field)?;
-    let median = |n: usize| {
-        let mut all: Vec<f64> = at_random.iter().skip(n).step_by(count).map(|sigma| sigma.alone).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
-    };
+    let median = |n: usize| middle(at_random.iter().skip(n).step_by(count).map(|sigma| sigma.alone).collect());
     let merits = |sigmas: &[f64]| {
         let merit = |(k, sigma): (usize, &f64)| Merit { nights: k + 1, sigma_k_kms: bounded(*sigma) };
         sigmas.iter().enumerate().map(merit).collect()

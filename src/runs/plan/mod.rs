@@ -9,22 +9,27 @@
 //!    from map to map the median is taken.
 //! 4. On request the nights are [chosen](Choice) that say most of one planet.
 
+mod ahead;
 mod campaign;
 mod choice;
 mod file;
 mod forecast;
 mod outlook;
 
-pub use campaign::{Campaign, CampaignError, LightRecord, SetRecord, SpotsSource};
+pub use campaign::{Campaign, LightRecord, SetRecord, SpotsSource};
 pub use choice::{Aim, Choice, ChosenNight, Merit};
 pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
 pub use forecast::{Forecast, ForecastError, Next};
 pub use outlook::{Expected, Outlook};
 
+use crate::data::config::ConfigError;
+use crate::data::scene::SceneError;
 use crate::field::FieldError;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
+use crate::surface::NoFit;
 use crate::surface::expansion::nuisances;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Periods over which schedules are compared, even in their logarithm.
@@ -47,6 +52,40 @@ pub struct PlanSettings {
     pub seed: u64,
     /// Whether systemic velocity and stellar parameters are those of the config, rather than integrated out.
     pub fixed: bool,
+}
+
+/// Why there is no campaign.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The config or its observations are at fault.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The spots of the observed profiles cannot be integrated out.
+    #[error("{}: no field of spots fits the observed profiles: {source}", path.display())]
+    Field {
+        /// The config.
+        path: PathBuf,
+        /// What is wrong.
+        source: NoFit,
+    },
+    /// More nights are asked for than there are.
+    #[error("--nights {wanted}: {}: {key} lists {listed} nights", path.display())]
+    Nights {
+        /// The config.
+        path: PathBuf,
+        /// The key of its nights.
+        key: String,
+        /// Nights asked for.
+        wanted: usize,
+        /// Nights of the config.
+        listed: usize,
+    },
+}
+
+impl From<ConfigError> for CampaignError {
+    fn from(error: ConfigError) -> Self {
+        CampaignError::Scene(error.into())
+    }
 }
 
 /// Why there is no plan.

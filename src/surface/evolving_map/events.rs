@@ -10,6 +10,7 @@ use super::fit::fit;
 use super::star::DEGREE;
 use super::{Assumed, Basis, Design, Fitted, Known, Marginal, NoFit};
 use crate::model::{Parameter, ParameterValues};
+use crate::numerics::quantile::middle;
 use crate::surface::checks::chi2_exceeds;
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
@@ -120,9 +121,7 @@ pub fn events(
 fn over_usual(imager: &Imager, chi2: &[f64]) -> Vec<(f64, f64)> {
     let data: Vec<f64> = imager.profiles().map(|(_, _, bins)| bins as f64).collect();
     let of_set = |set: std::ops::Range<usize>| {
-        let mut all: Vec<f64> = set.clone().map(|k| chi2[k] / data[k]).collect();
-        all.sort_by(f64::total_cmp);
-        let usual = all[all.len() / 2];
+        let usual = middle(set.clone().map(|k| chi2[k] / data[k]).collect());
         set.map(move |k| (k, usual)).collect::<Vec<_>>()
     };
     let sets = imager.profiles_of_sets().into_iter().filter(|set| !set.is_empty());

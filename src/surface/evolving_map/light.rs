@@ -9,6 +9,7 @@ use super::indicators;
 use super::{Basis, MEAN_FILLING, Marginal};
 use crate::field::Epoch;
 use crate::model::{Parameter, ParameterValues};
+use crate::numerics::quantile::middle;
 use crate::star::StarState;
 use crate::surface::expansion::stellar_step;
 use crate::surface::imaging::Imager;
@@ -171,9 +172,7 @@ pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
         let chi2 = of_curve.iter().map(|(_, off)| off * off).sum::<f64>() / of_curve.len() as f64;
         let name = &curve.name;
         // a few wild bins do not hide each other
-        let mut deviations: Vec<f64> = of_curve.iter().map(|(_, off)| off.abs()).collect();
-        deviations.sort_by(f64::total_cmp);
-        let scatter = (1.4826 * deviations[deviations.len() / 2]).max(1.0);
+        let scatter = (1.4826 * middle(of_curve.iter().map(|(_, off)| off.abs()).collect())).max(1.0);
         let wild: Vec<&(f64, f64)> = of_curve.iter().filter(|(_, off)| off.abs() > BEYOND_NOISE * scatter).collect();
         if !wild.is_empty() {
             let mut named: Vec<String> =

@@ -2,6 +2,7 @@
 //! begin and end elsewhere.
 
 use super::row::{Digits, Fault, Row, fault};
+use crate::numerics::quantile::middle;
 
 /// A uniform velocity axis (km/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,9 +80,7 @@ impl Axis {
     /// The first point that breaks the usual step; where none does, the axis drifts and its worst point is named.
     fn culprit(&self, rows: &[Row]) -> Fault {
         let steps: Vec<f64> = rows.windows(2).map(|p| p[1].velocity - p[0].velocity).collect();
-        let mut sorted = steps.clone();
-        sorted.sort_by(f64::total_cmp);
-        let usual = sorted[sorted.len() / 2];
+        let usual = middle(steps.clone());
         let breaks = steps.iter().position(|s| (s - usual).abs() > UNIFORMITY * usual).map(|j| j + 1);
         let by_deviation = |a: &usize, b: &usize| self.deviation(rows, *a).total_cmp(&self.deviation(rows, *b));
         let j = breaks.or_else(|| (0..rows.len()).max_by(by_deviation)).unwrap_or(0);

@@ -7,6 +7,7 @@ use super::level::{self, Given};
 use super::row::{Digits, Fault, Row, fault, shown};
 use crate::data::io::outweighs;
 use crate::data::io::table::{Line, Lines, Separator, has_decimal_comma, number};
+use crate::numerics::quantile::middle;
 use std::ops::Range;
 
 /// A profile as it stands in its file, on a uniform velocity axis.
@@ -102,9 +103,7 @@ pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
         let fill = is_fill(j).then(|| format!("intensity is {} at the end of the profile, no data", row.intensity));
         profile.bad.extend(row.bad.clone().or(fill).map(|problem| (j, Fault { line: row.line, problem })));
     }
-    let mut sigmas: Vec<f64> = good.iter().map(|j| rows[*j].sigma).collect();
-    sigmas.sort_by(f64::total_cmp);
-    let usual = sigmas[sigmas.len() / 2];
+    let usual = middle(good.iter().map(|j| rows[*j].sigma).collect());
     let sound = rows.iter().enumerate().filter(|(_, row)| row.bad.is_none());
     profile.bad.extend(sound.filter_map(|(j, row)| {
         let problem = format!("sigma {:e} is {}", row.sigma, outweighs(row.sigma, usual, "bins")?);

@@ -4,7 +4,7 @@
 //! spots); the line of a companion that moves through that of the star, or beside it, by tens of percent.
 
 use super::mean::MeanProfile;
-use crate::numerics::quantile::quantile;
+use crate::numerics::quantile::{middle, quantile};
 use crate::star::observation::{Observations, Profile};
 
 /// The line ends where it comes up to this part of the depth of the mean profile.
@@ -38,7 +38,7 @@ impl DoubleLines {
         let mean = MeanProfile::of(observations).ok()?;
         let half = (SMOOTHING * sigma_kms / mean.step_kms).round() as usize;
         let depth = DEPTH * seen(&mean.depth, half).into_iter().reduce(f64::max)?;
-        let noise = |profile: &Profile| super::median(profile.sigma.clone()) / ((2 * half + 1) as f64).sqrt();
+        let noise = |profile: &Profile| middle(profile.sigma.clone()) / ((2 * half + 1) as f64).sqrt();
         let profiles = &observations.profiles;
         if profiles.len() < FEWEST || profiles.iter().any(|profile| noise(profile) > NOISE * depth) {
             return None;

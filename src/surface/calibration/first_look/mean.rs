@@ -4,6 +4,7 @@
 //! enough for a first look and used for nothing else.
 
 use super::LookError;
+use crate::numerics::quantile::middle;
 use crate::star::observation::{Observations, Profile};
 
 /// Fewest bins that a line must have above half its depth.
@@ -68,7 +69,7 @@ impl MeanProfile {
         let count = profiles.len() as f64;
         let velocities = (0..=bins as usize).map(|j| first + j as f64 * step);
         let depth = velocities.map(|v| profiles.iter().map(|p| 1.0 - p.intensity_at(v)).sum::<f64>() / count);
-        let variance: f64 = profiles.iter().map(|p| super::median(p.sigma.clone()).powi(2)).sum();
+        let variance: f64 = profiles.iter().map(|p| middle(p.sigma.clone()).powi(2)).sum();
         Ok(MeanProfile {
             first_velocity_kms: first,
             step_kms: step,
@@ -105,7 +106,7 @@ impl MeanProfile {
     fn at_its_ends(&self) -> f64 {
         let bins = (self.depth.len() / ENDS).max(1);
         let (first, last) = (&self.depth[..bins], &self.depth[self.depth.len() - bins..]);
-        0.5 * (super::median(first.to_vec()) + super::median(last.to_vec()))
+        0.5 * (middle(first.to_vec()) + middle(last.to_vec()))
     }
 
     /// Level of the continuum, or of the last of the line.

@@ -228,9 +228,3 @@ impl LineModel {
         LimbDarkening::Linear(self.limb_darkening)
     }
 }
-
-/// The middle of some values; NaN of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}

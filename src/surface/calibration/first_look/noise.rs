@@ -1,6 +1,6 @@
 //! How noisy the profiles are: what their errors say, and what the continuum beside the line says.
 
-use super::median;
+use crate::numerics::quantile::middle;
 use crate::star::observation::{Observations, Profile};
 use nalgebra::{DMatrix, DVector};
 use std::cmp::Ordering;
@@ -155,7 +155,7 @@ impl Noise {
         }
         let sigmas = observations.profiles.iter().flat_map(|p| p.sigma.iter().copied()).collect();
         Noise {
-            quoted: median(sigmas),
+            quoted: middle(sigmas),
             scatter: (bins >= FEWEST_BINS && square > 0.0).then(|| (square / freedom as f64).sqrt()),
         }
     }
