@@ -14,8 +14,8 @@ mod remarks;
 mod robustness;
 
 pub use known::{KnownPlanet, KnownPlanets};
-pub use remarks::Evidence;
-pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, robustness};
+pub use remarks::{Evidence, of_night_offsets};
+pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, beside_night_offsets, robustness};
 
 use crate::model::{Ephemeris, Parameter, ParameterValues};
 use crate::planets::periodogram::eccentric::keplerian;

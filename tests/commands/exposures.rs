@@ -15,6 +15,7 @@ fn star() -> Value {
     let cycles: Vec<f64> = (0..24).map(|k| 0.3 * f64::from(k) + 0.05 * f64::from(k % 3)).collect();
     json!({
         "star": { "rotation_period_d": 1.0, "inclination_deg": 60.0, "vsini_kms": 45.0, "contrast": 0.3, "fitted": [],
+                  "regions": { "area": 0.0 },
                   "line": { "sigma_kms": 3.0, "equivalent_width_kms": 6.0 } },
         "planet": { "k_kms": 0.1, "porb_over_prot": 2.3, "phi": 0.2 },
         "observations": { "exposure_s": EXPOSURE_S, "velocity_jitter_kms": 0.0, "simulate": {
@@ -83,6 +84,8 @@ fn exposures_of_a_first_config_and_of_an_injection_stay() {
         "60",
         "--pixels",
         "300",
+        "--objective",
+        "spottedness",
     ]);
     let scene = |config: &str| Scene::new(&Config::load(&desk.path(config)).unwrap()).unwrap();
     let exposures = |config: &str| scene(config).imager.sets[0].exposures.clone();

@@ -37,6 +37,11 @@ pub fn desk() -> Desk {
 pub const INIT: [&str; 8] =
     ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "50", "--pixels", "300"];
 
+/// With the objective that is tried out in no time, where what the profiles say is the question.
+pub fn quick() -> Vec<&'static str> {
+    [&INIT[..], &["--objective", "spottedness"]].concat()
+}
+
 fn number(config: &Value, pointer: &str) -> f64 {
     config.pointer(pointer).unwrap_or_else(|| panic!("{pointer}")).as_f64().unwrap_or_else(|| panic!("{pointer}"))
 }
@@ -139,7 +144,7 @@ fn options_replace_what_is_measured() {
     ];
     let texts: Vec<String> =
         options.iter().flat_map(|(name, _, value)| [name.to_string(), value.to_string()]).collect();
-    let args: Vec<&str> = INIT.into_iter().chain(texts.iter().map(String::as_str)).collect();
+    let args: Vec<&str> = quick().into_iter().chain(texts.iter().map(String::as_str)).collect();
     let table = desk.succeed(&args);
     let config = desk.json("star.json");
     for (name, pointer, value) in options {
@@ -163,8 +168,11 @@ fn wrong_errors_are_scaled() {
                 text.lines().enumerate().map(|(n, l)| if n < 2 { format!("{l}\n") } else { scaled(l) }).collect()
             });
         }
-        let table = desk.succeed(&INIT);
-        says(&table, &["observations.sigma_scale", "auto", "rescaled by", "note: test fit: evolving maps fit "]);
+        let table = desk.succeed(&quick());
+        says(
+            &table,
+            &["observations.sigma_scale", "auto", "rescaled by", "note: test fit: a brightness that varies by"],
+        );
         assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
         desk.succeed(&["map", "star.json", "--out", "map"]);
         let found = number(&desk.json("map/fit.json"), "/measured/errors/sigma_scale");
@@ -199,7 +207,7 @@ fn with_rows(desk: &Desk, change: impl Fn(usize, f64, f64, f64) -> (f64, f64)) {
 fn a_continuum_that_is_not_at_one_is_recognised() {
     let desk = desk();
     with_intensities(&desk, |_, intensity| 0.977 * intensity);
-    let table = desk.succeed(&[&INIT[..], &["--objective", "spottedness"]].concat());
+    let table = desk.succeed(&quick());
     says(
         &table,
         &[
@@ -252,7 +260,7 @@ fn continua_that_wander_are_let() {
 #[test]
 fn a_map_that_does_not_fit_says_why() {
     let desk = desk();
-    desk.succeed(&[&INIT[..], &["--objective", "spottedness"]].concat());
+    desk.succeed(&quick());
     let mut config = desk.json("star.json");
     config["imaging"]["pixels"] = json!(500);
     config["star"]["vsini_kms"] = json!(21.0);
@@ -323,12 +331,12 @@ fn a_continuum_at_the_ends_alone_is_recognised() {
     let desk = Desk::new(config);
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
     with_intensities(&desk, |_, intensity| 0.977 * intensity);
-    let table = desk.succeed(&INIT);
+    let table = desk.succeed(&quick());
     says(
         &table,
         &[
             "observations.continuum_level",
-            "note: test fit: evolving maps fit",
+            "note: test fit: a brightness that varies by",
             "as quoted: too little continuum beside the line to measure them by. Give profiles that reach farther, or",
         ],
     );
@@ -343,7 +351,7 @@ fn a_continuum_at_the_ends_alone_is_recognised() {
     config["observations"]["simulate"]["velocity_kms"] = json!({ "min": -22.1, "max": 25.5, "step": 1.7 });
     let cut = Desk::new(config);
     cut.succeed(&["simulate", "config.json", "--out", "data"]);
-    cut.succeed(&[&INIT[..], &["--line-sigma", "2.5"]].concat());
+    cut.succeed(&[&quick()[..], &["--line-sigma", "2.5"]].concat());
     assert!(cut.json("star.json")["observations"].get("continuum_level").is_none());
 }
 
@@ -352,8 +360,8 @@ fn a_continuum_at_the_ends_alone_is_recognised() {
 fn continua_that_are_tilted_are_let() {
     let desk = desk();
     with_rows(&desk, |_, v, i, s| (i * (1.0 + 2e-4 * v), s));
-    let table = desk.succeed(&INIT);
-    says(&table, &["imaging.nuisances.continuum_slope", "above the noise", "test fit: evolving maps"]);
+    let table = desk.succeed(&quick());
+    says(&table, &["imaging.nuisances.continuum_slope", "above the noise", "test fit: a brightness"]);
     let config = desk.json("star.json");
     let range = &config["observations"]["velocity_range_kms"];
     let expected = 1e-4 * (range[1].as_f64().unwrap() - range[0].as_f64().unwrap());
@@ -499,7 +507,7 @@ fn the_observations_are_found_from_wherever_the_config_is() {
         ("data/inside/star.json", "../observations.txt"),
     ];
     for (out, expected) in cases {
-        desk.succeed(&[&INIT[..], &["--out", out]].concat());
+        desk.succeed(&[&quick()[..], &["--out", out]].concat());
         let config = desk.json(out);
         assert_eq!(Path::new(config["observations"]["path"].as_str().unwrap()), Path::new(expected));
         assert!(config.get("$schema").is_none());
@@ -508,7 +516,7 @@ fn the_observations_are_found_from_wherever_the_config_is() {
     // the schema is named where it lies beside the config
     let schema = text(&dimcmc(&["schema"], &desk.path("")).stdout);
     desk.write("configs/dimcmc.schema.json", &schema);
-    desk.succeed(&[&INIT[..], &["--out", "configs/star.json"]].concat());
+    desk.succeed(&[&quick()[..], &["--out", "configs/star.json"]].concat());
     assert_eq!(desk.json("configs/star.json")["$schema"], "dimcmc.schema.json");
 }
 
@@ -564,7 +572,7 @@ fn what_cannot_be_is_refused_in_a_line() {
         &["flat.txt: no absorption line in the mean profile"],
     );
     assert_eq!(desk.read("star.json"), "precious");
-    desk.succeed(&[&INIT[..], &["--force"]].concat());
+    desk.succeed(&[&quick()[..], &["--force"]].concat());
     assert_ne!(desk.read("star.json"), "precious");
 }
 

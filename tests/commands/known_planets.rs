@@ -84,3 +84,35 @@ fn two_known_planets_are_judged_together_and_a_third_is_found_beside_them() {
     let first = &one.json("third/periodogram.json")["second"]["orbits"][0];
     assert!((number(&first["k_kms"]) - K_KMS[1]).abs() < 4.0 * number(&first["sigma_k_kms"]), "{first}");
 }
+
+/// RV offsets from night to night that are larger where the planet would be receding.
+#[test]
+fn a_known_planet_is_compared_with_offsets_of_nights() {
+    let mut star = config();
+    for section in ["planet", "parameters"] {
+        let section = star[section].as_object_mut().unwrap();
+        section.retain(|key, _| !["k2_kms", "period2_d", "t_conjunction2_d"].contains(&key.as_str()));
+    }
+    star["planet"]["k_kms"] = json!(0.0);
+    let desk = Desk::new(star.clone());
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    desk.edit("data/observations.txt", |list| {
+        let with_offset = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+            [file, time, _] if file != "#" => {
+                let night = time.parse::<f64>().unwrap().round();
+                let orbit = (std::f64::consts::TAU * (night - CONJUNCTIONS_D[0]) / PERIODS_D[0]).sin();
+                // what VRAD holds is subtracted
+                format!("{file} {time} {}\n", -0.15 * (2.1 * night * night).sin() - 0.1 * orbit)
+            }
+            _ => format!("{line}\n"),
+        };
+        list.lines().map(with_offset).collect()
+    });
+    star["observations"] = json!({ "path": "data/observations.txt" });
+    desk.write("star.json", &star.to_string());
+    let said = desk.succeed(&["periodogram", "star.json", "--draws", "1000", "--out", "search"]);
+    println!("{said}");
+    says(&said, &["Known planet: candidate", "not significant beside RV offsets of nights"]);
+    let beside = &desk.json("search/periodogram.json")["robustness"]["night_offsets"];
+    assert!(number(&beside["sigma_kms"]) > 0.08 && number(&beside["false_alarm_probability"]) > 0.01, "{beside}");
+}

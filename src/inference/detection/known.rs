@@ -14,6 +14,7 @@ use crate::planets::periodogram::orbits::SIGMA_OF_UNKNOWN_PHASE;
 use crate::planets::periodogram::two_planets::without;
 use crate::planets::periodogram::{CircularOrbit, Jitters, Peak};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::{CANDIDATE_FAP, one_sided};
 use crate::surface::{Linearised, WithoutJitter};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::borrow::Cow;
@@ -183,6 +184,11 @@ impl KnownPlanets {
 }
 
 impl KnownPlanet {
+    /// Whether a star without it seldom shows such a K.
+    pub fn is_candidate(&self) -> bool {
+        one_sided(self.alone[0] / self.alone[1]) < CANDIDATE_FAP
+    }
+
     /// The orbit, of the K of a star with it where it is bounded.
     pub fn orbit(&self) -> CircularOrbit {
         let mut values = ParameterValues::of_eight([0.0; 8]);

@@ -273,20 +273,24 @@ impl Detection {
             ));
         }
         remarks.extend(decided(&robustness.decisive_nights(level)));
-        let beside = robustness.night_offsets.filter(|beside| beside.false_alarm_probability > CANDIDATE_FAP);
-        if let Some(NightOffsets { sigma_kms, false_alarm_probability, .. }) = beside {
-            remarks.push(Remark::against(
-                "not significant beside RV offsets of nights",
-                format!(
-                    "Beside RV offsets of {:.0} m/s from night to night the signal is not significant: FAP = {:.1} %. \
-                    If the spectrograph's are known, set observations.night_jitter_kms.",
-                    1000.0 * sigma_kms,
-                    100.0 * false_alarm_probability
-                ),
-            ));
-        }
+        remarks.extend(robustness.night_offsets.and_then(of_night_offsets));
         remarks
     }
+}
+
+/// That a signal is not significant beside such offsets.
+pub fn of_night_offsets(NightOffsets { sigma_kms, false_alarm_probability, .. }: NightOffsets) -> Option<Remark> {
+    (false_alarm_probability > CANDIDATE_FAP).then(|| {
+        Remark::against(
+            "not significant beside RV offsets of nights",
+            format!(
+                "Beside RV offsets of {:.0} m/s from night to night the signal is not significant: FAP = {:.1} %. If \
+                the spectrograph's are known, set observations.night_jitter_kms.",
+                1000.0 * sigma_kms,
+                100.0 * false_alarm_probability
+            ),
+        )
+    })
 }
 
 /// That a signal depends on these nights, each by itself.

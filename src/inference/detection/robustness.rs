@@ -6,7 +6,7 @@
 
 use super::{Detection, DetectionSettings, KnownPlanet};
 use crate::model::{Parameter, ParameterValues};
-use crate::planets::periodogram::nights::{NightOffsets, night_offsets};
+use crate::planets::periodogram::nights::{Compared, NightOffsets, night_offsets};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Peak, SearchSettings, orbits};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
@@ -59,7 +59,7 @@ pub struct Robustness {
     pub targets: Vec<AtTarget>,
     /// Without each night, in order of time; empty if the profiles are of one night, or too few.
     pub nights: Vec<WithoutNight>,
-    /// What RV offsets of nights make of the highest peak, where it is a candidate beside a fitted jitter.
+    /// What RV offsets of nights make of it, where it is a candidate beside a fitted jitter.
     pub night_offsets: Option<NightOffsets>,
 }
 
@@ -165,19 +165,34 @@ pub fn robustness(
             delta_ln_p,
         }
     });
-    let night_offsets = match tried {
-        Tried::Peak(_) if found.is_candidate() => beside_night_offsets(imager, settings.search, found),
-        _ => None,
-    };
+    let night_offsets = beside_night_offsets(imager, settings.search, found, tried);
     Robustness { all, targets, nights: without.collect(), night_offsets }
 }
 
-/// What RV offsets of nights make of the highest peak of the blind search.
-fn beside_night_offsets(imager: &Imager, settings: SearchSettings, found: &Detection) -> Option<NightOffsets> {
+/// What RV offsets of nights make of the highest peak of the blind search, if it is a candidate, or of a known planet
+/// that would be one.
+pub fn beside_night_offsets(
+    imager: &Imager,
+    settings: SearchSettings,
+    found: &Detection,
+    tried: Tried,
+) -> Option<NightOffsets> {
     let WithoutJitter { here, found_kms, scale_kms } = found.without_jitter.as_ref()?;
-    let velocities = found.known.beside(&here.quadratic);
-    let at = (1.0 / found.blind.best().porb_over_prot, &found.frequencies);
-    night_offsets(&velocities, &imager.nights_of_sets(), (*found_kms, *scale_kms), at, settings)
+    let nights = imager.nights_of_sets();
+    let beside = |velocities: &VelocityQuadratic, planet: Compared| {
+        night_offsets(velocities, &nights, (*found_kms, *scale_kms), planet, settings)
+    };
+    match tried {
+        Tried::Peak(_) if found.is_candidate() => {
+            let peak = Compared::Peak(1.0 / found.blind.best().porb_over_prot, &found.frequencies);
+            beside(&found.known.beside(&here.quadratic), peak)
+        }
+        Tried::Known(planet) if planet.is_candidate() => {
+            let velocities = found.known.beside_others(planet, &here.quadratic);
+            beside(&velocities, Compared::Known(&planet.ephemeris.unit_velocities(&velocities.cycles)))
+        }
+        _ => None,
+    }
 }
 
 /// An orbit with the Delta ln L of another.

@@ -7,7 +7,7 @@
 
 use super::jitter::{Jitters, Level};
 use super::orbits::{Trial, design, scan};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -22,7 +22,29 @@ const ROWS: usize = 1024;
 /// The highest Delta ln L over the trial frequencies of each of `draws` gradients, the jitter being what suits best
 /// without an orbit and with each.
 pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Vec<f64> {
-    let rows: Vec<DMatrix<f64>> = jitters.levels.iter().map(|level| whitened(level, frequencies)).collect();
+    heights(jitters, &|level| whitened(level, frequencies), highest, draws, seed)
+}
+
+/// Delta ln L of the amplitude of the velocities `unit` of each of `draws` gradients, 0 of one below 0; the jitter as
+/// for [`maxima`].
+pub fn amplitudes(jitters: &Jitters, unit: &DVector<f64>, draws: usize, seed: u64) -> Vec<f64> {
+    let row = |level: &Level| {
+        let information = unit.dot(&(&level.quadratic.information * unit));
+        let row = level.root.tr_mul(unit) / information.sqrt();
+        DMatrix::from_row_slice(1, row.len(), row.as_slice())
+    };
+    heights(jitters, &row, above_zero, draws, seed)
+}
+
+/// Delta ln L of each of `draws` gradients: without a jitter what `of` makes of the rows of its level and of deviates.
+fn heights(
+    jitters: &Jitters,
+    rows: &dyn Fn(&Level) -> DMatrix<f64>,
+    of: fn(&DMatrix<f64>, &DMatrix<f64>) -> Vec<f64>,
+    draws: usize,
+    seed: u64,
+) -> Vec<f64> {
+    let rows: Vec<DMatrix<f64>> = jitters.levels.iter().map(rows).collect();
     let profiles = jitters.levels[0].quadratic.len();
     let block = |block: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -30,12 +52,12 @@ pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -
         let size = DRAWS.min(draws - block * DRAWS);
         let deviates = DMatrix::from_fn(profiles, size, |_, _| rng.sample::<f64, _>(StandardNormal));
         if jitters.is_none() {
-            return highest(&rows[0], &deviates);
+            return of(&rows[0], &deviates);
         }
         let (mut without, mut with) = (vec![f64::NEG_INFINITY; size], vec![f64::NEG_INFINITY; size]);
         for (level, rows) in jitters.levels.iter().zip(&rows) {
             let squares = (&level.rotation * &deviates).map(|amplitude| amplitude * amplitude);
-            for (k, highest) in highest(rows, &deviates).into_iter().enumerate() {
+            for (k, highest) in of(rows, &deviates).into_iter().enumerate() {
                 let alone = level.constant + level.squares.dot(&squares.column(k));
                 without[k] = without[k].max(alone);
                 with[k] = with[k].max(alone + highest);
@@ -57,6 +79,11 @@ fn highest(rows: &DMatrix<f64>, deviates: &DMatrix<f64>) -> Vec<f64> {
         }
     }
     highest
+}
+
+/// Delta ln L of the amplitude in the only row, where it is above 0.
+fn above_zero(row: &DMatrix<f64>, deviates: &DMatrix<f64>) -> Vec<f64> {
+    (row * deviates).iter().map(|amplitude| 0.5 * amplitude.max(0.0).powi(2)).collect()
 }
 
 /// `L^-1 X' S` of all periods, two rows each, S S' being the covariance of the gradient.

@@ -145,6 +145,16 @@ impl Jitters {
         self.levels.iter().map(of).max_by(|a, b| a[2].total_cmp(&b[2])).unwrap_or([f64::NAN; 3])
     }
 
+    /// The height of the most likely amplitude of 0 or more of the velocities `unit`, beside the jitter that suits it
+    /// best, above none.
+    pub fn height_above_zero(&self, unit: &DVector<f64>) -> f64 {
+        let of = |level: &Level| {
+            let [mean, sd] = level.quadratic.amplitude(unit);
+            level.ln_l + 0.5 * (mean / sd).max(0.0).powi(2)
+        };
+        self.levels.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Height of an orbit of these velocities (km/s) beside the jitter that suits it best above no planet beside the
     /// jitter that suits this best.
     pub fn delta_ln_l(&self, velocities: &DVector<f64>) -> f64 {

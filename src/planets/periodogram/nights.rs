@@ -1,12 +1,14 @@
-//! RV offsets that all profiles of a night share, of unknown size: whether a peak is significant beside them.
+//! RV offsets that all profiles of a night share, of unknown size: whether a planet is significant beside them.
 //!
 //! A spectrograph whose zero point changes from night to night looks like a planet of several days. A jitter s of each
 //! profile and offsets t of the nights have the covariance `J = L L'` with `L = [s 1 | t N]`, N telling which profile
 //! is of which night. Beside it ln L of information I and gradient g has the information `I - I M I` and the gradient
 //! `(1 - I M) g`, `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As
 //! beside a jitter alone (`jitter`), s and t are those that suit best, without an orbit and with each orbit. Stars
-//! without a planet, with the offsets that are the most likely without one, say how often a peak is as high.
+//! without a planet, with the offsets that are the most likely without one, say how often a peak is as high, or K of a
+//! known planet.
 
+use super::draws::amplitudes;
 use super::jitter::{Jitters, Level, ln_prior, root};
 use super::{FalseAlarm, Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
@@ -33,25 +35,34 @@ const NIGHTS: usize = 3;
 /// Stars that are drawn: the probability is compared with 1 %.
 const DRAWS: usize = 2_000;
 
-/// What offsets of nights make of a peak.
+/// What offsets of nights make of a planet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NightOffsets {
     /// Their most likely standard deviation without a planet (km/s).
     pub sigma_kms: f64,
     /// By how much they raise ln L of a star without a planet, their prior counted.
     pub gain: f64,
-    /// How often stars without a planet, with such offsets, show a peak as high.
+    /// How often stars without it, with such offsets, show a peak as high, or of a known planet such a K.
     pub false_alarm_probability: f64,
 }
 
-/// What offsets of `nights` make of the peak at one of the `frequencies` (orbits a rotation cycle), beside a jitter
-/// which is `found_kms` without a planet and has a prior of that scale; the offsets have the same prior, or that of
-/// 30 m/s. `None` where the profiles do not tell the offsets from a jitter, show none, or no orbit is bounded.
+/// A planet that is compared with offsets.
+#[derive(Clone, Copy, Debug)]
+pub enum Compared<'a> {
+    /// The peak at one of the frequencies (orbits a rotation cycle).
+    Peak(f64, &'a Frequencies),
+    /// One of which K alone is unknown: its velocities for a K of 1.
+    Known(&'a DVector<f64>),
+}
+
+/// What offsets of `nights` make of a planet, beside a jitter which is `found_kms` without it and has a prior of that
+/// scale; the offsets have the same prior, or that of 30 m/s. `None` where the profiles do not tell the offsets from a
+/// jitter, show none, or no orbit is bounded.
 pub fn night_offsets(
     without: &VelocityQuadratic,
     nights: &[Vec<usize>],
     (found_kms, scale_kms): (f64, Option<f64>),
-    (frequency, frequencies): (f64, &Frequencies),
+    planet: Compared,
     settings: SearchSettings,
 ) -> Option<NightOffsets> {
     if nights.iter().filter(|night| night.len() > 1).count() < NIGHTS {
@@ -86,13 +97,19 @@ pub fn night_offsets(
     let mut parts = scatters(jitters.map(|part| part * null.jitter_kms), &offsets.map(|part| part * null.night_kms));
     parts.push(Scatter { jitter_kms: found_kms, night_kms: 0.0 });
     let all = of_scatters(without, beside(null)?, parts.into_par_iter().filter_map(beside).collect());
-    let height = all.orbit_at(frequency)?.delta_ln_l;
-    let false_alarm = FalseAlarm::draw(&all, &frequencies.per_cycle, DRAWS.min(settings.draws), settings.seed);
-    Some(NightOffsets {
-        sigma_kms: null.night_kms,
-        gain: heights[best] - heights[plain],
-        false_alarm_probability: false_alarm.probability(height).value(),
-    })
+    let (draws, seed) = (DRAWS.min(settings.draws), settings.seed);
+    let false_alarm_probability = match planet {
+        Compared::Peak(frequency, frequencies) => {
+            let height = all.orbit_at(frequency)?.delta_ln_l;
+            FalseAlarm::draw(&all, &frequencies.per_cycle, draws, seed).probability(height).value()
+        }
+        Compared::Known(unit) => {
+            let height = all.height_above_zero(unit);
+            let above = amplitudes(&all, unit, draws, seed).into_iter().filter(|drawn| *drawn >= height).count();
+            (1 + above) as f64 / (1 + draws) as f64
+        }
+    };
+    Some(NightOffsets { sigma_kms: null.night_kms, gain: heights[best] - heights[plain], false_alarm_probability })
 }
 
 /// Standard deviations of jitter and offsets.
@@ -207,7 +224,8 @@ mod tests {
         let jitters = Jitters::new(&velocities, found_kms, None);
         let heights = jitters.scan(&frequencies.per_cycle);
         let highest = heights.iter().max_by(|a, b| a.delta_ln_l.total_cmp(&b.delta_ln_l)).unwrap();
-        night_offsets(&velocities, &nights, (found_kms, None), (highest.trial.frequency, &frequencies), settings)
+        let peak = Compared::Peak(highest.trial.frequency, &frequencies);
+        night_offsets(&velocities, &nights, (found_kms, None), peak, settings)
     }
 
     /// By the covariance of the velocities.
@@ -258,6 +276,39 @@ mod tests {
         assert!((sizes.sqrt() / 0.08 - 1.0).abs() < 0.15, "{sizes}");
     }
 
+    /// Of a planet whose ephemeris is known.
+    fn known(night_kms: f64, k_kms: f64, seed: u64) -> Option<NightOffsets> {
+        let (velocities, nights) = of(0.0, night_kms, k_kms, seed);
+        let unit = sample::orbit(&velocities.cycles, 1.0, 1.7, 0.3);
+        let found_kms = night_kms.hypot(k_kms / std::f64::consts::SQRT_2);
+        let settings = SearchSettings { draws: 2000, seed: 1 };
+        night_offsets(&velocities, &nights, (found_kms, None), Compared::Known(&unit), settings)
+    }
+
+    /// K of such a planet is as improbable as it says.
+    #[test]
+    fn offsets_of_nights_are_no_known_planet() {
+        let mut all: Vec<f64> = (0..200)
+            .filter_map(|seed| known(0.08, 0.0, seed))
+            .collect::<Vec<_>>()
+            .iter()
+            .map(|found| found.false_alarm_probability)
+            .collect();
+        all.sort_by(f64::total_cmp);
+        let half = all.partition_point(|p| *p < 0.5);
+        println!("{} {half} {:?}", all.len(), &all[..12]);
+        // half of the draws are below zero, and have 1; exceeded once in a hundred by chance: 1.63 / sqrt(200)
+        let distance = |(k, p): (usize, &f64)| ((k as f64 + 0.5) / all.len() as f64 - p).abs();
+        let distance = all[..half].iter().enumerate().map(distance).fold(0.0, f64::max);
+        assert!(all.len() > 195 && distance < 0.115 && half.abs_diff(100) < 25, "{distance} {half}");
+    }
+
+    #[test]
+    fn a_known_planet_is_no_offset_of_nights() {
+        let all: Vec<NightOffsets> = (0..6).filter_map(|seed| known(0.0, 0.1, seed)).collect();
+        assert!(all.iter().all(|found| found.false_alarm_probability < 1e-2), "{all:?}");
+    }
+
     /// Beside a jitter or none.
     #[test]
     fn a_planet_is_no_offset_of_nights() {
@@ -277,7 +328,8 @@ mod tests {
         let frequencies = Frequencies::new(&velocities.cycles, 1.0, FrequencySettings::default()).unwrap();
         let alone: Vec<Vec<usize>> = (0..36).map(|k| vec![k]).collect();
         let settings = SearchSettings { draws: 1000, seed: 1 };
-        assert_eq!(night_offsets(&velocities, &alone, (0.08, None), (0.5, &frequencies), settings), None);
+        let peak = Compared::Peak(0.5, &frequencies);
+        assert_eq!(night_offsets(&velocities, &alone, (0.08, None), peak, settings), None);
     }
 
     /// A velocity that all profiles have in common is open.
@@ -287,7 +339,8 @@ mod tests {
         let open = velocities.beside(&DMatrix::from_element(36, 1, 1.0)).unwrap();
         let frequencies = Frequencies::new(&open.cycles, 1.0, FrequencySettings::default()).unwrap();
         let settings = SearchSettings { draws: 1000, seed: 1 };
-        let found = night_offsets(&open, &nights, (0.08, None), (1.0 / 1.7, &frequencies), settings).unwrap();
+        let peak = Compared::Peak(1.0 / 1.7, &frequencies);
+        let found = night_offsets(&open, &nights, (0.08, None), peak, settings).unwrap();
         assert!((0.04..0.16).contains(&found.sigma_kms) && found.false_alarm_probability > 1e-3, "{found:?}");
     }
 }

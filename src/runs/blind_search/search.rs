@@ -6,11 +6,12 @@ use super::summary::SearchSummary;
 use crate::data::io::provenance::Measured;
 use crate::data::scene::Scene;
 use crate::inference::detection::{
-    Detection, DetectionSettings, Evidence, KnownPlanet, Robustness, Stage, Tried, robustness,
+    Detection, DetectionSettings, Evidence, KnownPlanet, Robustness, Stage, Tried, beside_night_offsets,
+    of_night_offsets, robustness,
 };
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Parameter, for_blind_search};
-use crate::planets::verdict::{CANDIDATE_FAP, Remark, Signal, UNBOUNDED, Verdict, one_sided};
+use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
 use crate::surface::{Constants, Explained, Linearised};
 use std::borrow::Cow;
 
@@ -76,7 +77,7 @@ impl<'a> BlindSearch<'a> {
         let is_tried = match options.robustness {
             RobustnessOf::Any => true,
             RobustnessOf::Candidates => match detection.known.first() {
-                Some(KnownPlanet { alone: [k_kms, sigma_kms], .. }) => one_sided(k_kms / sigma_kms) < CANDIDATE_FAP,
+                Some(planet) => planet.is_candidate(),
                 None => detection.is_candidate(),
             },
             RobustnessOf::None => false,
@@ -97,7 +98,15 @@ impl<'a> BlindSearch<'a> {
         let of_the_star = detection.of_the_star(&evidence);
         let why_not = scene.measured.problem().or_else(|| detection.not_judged());
         let judged = |verdict: Verdict| why_not.as_ref().map_or(verdict, Verdict::not_judged);
-        let verdict_on = |planet: &KnownPlanet| judged(known(planet, detection.known.planets.len(), &of_the_star));
+        let verdict_on = |planet: &KnownPlanet| {
+            let mut remarks = of_the_star.clone();
+            if options.robustness != RobustnessOf::None && Some(planet) != first {
+                let tried = Tried::Known(planet);
+                let beside = beside_night_offsets(imager, settings.search, &detection, tried);
+                remarks.extend(beside.and_then(of_night_offsets));
+            }
+            judged(known(planet, detection.known.planets.len(), &remarks))
+        };
         let known: Vec<Verdict> = detection.known.planets.iter().map(verdict_on).collect();
         let mut verdict = detection.verdict(&remarks);
         let mut blind = None;
