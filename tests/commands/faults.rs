@@ -231,6 +231,24 @@ fn a_missing_permission_is_a_failure() {
 }
 
 #[test]
+#[cfg(unix)]
+fn two_processes_do_not_write_into_one_folder() {
+    let desk = Desk::new(tiny(60));
+    let other = desk.path("out");
+    std::fs::create_dir(&other).unwrap();
+    let folder = std::fs::File::open(&other).unwrap();
+    folder.lock().unwrap();
+    for force in [&["--force"][..], &[]] {
+        let output = dimcmc(&[&["simulate", "config.json", "--out", "out"], force].concat(), &desk.path(""));
+        assert_eq!(output.status.code(), Some(1));
+        says(&text(&output.stderr), &["error: --out out: another process is writing there"]);
+    }
+    assert!(std::fs::read_dir(&other).unwrap().next().is_none());
+    drop(folder);
+    desk.succeed(&["simulate", "config.json", "--out", "out"]);
+}
+
+#[test]
 fn numbers_beyond_sense_are_refused_by_key() {
     let desk = Desk::new(tiny(2));
     for (pointer, value, parts) in [

@@ -96,23 +96,32 @@ fn a_known_planet_is_compared_with_offsets_of_nights() {
     star["planet"]["k_kms"] = json!(0.0);
     let desk = Desk::new(star.clone());
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
-    desk.edit("data/observations.txt", |list| {
+    let offset = |sign: f64| {
         let with_offset = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
-            [file, time, _] if file != "#" => {
+            [file, time, ..] if file != "#" => {
                 let night = time.parse::<f64>().unwrap().round();
                 let orbit = (std::f64::consts::TAU * (night - CONJUNCTIONS_D[0]) / PERIODS_D[0]).sin();
                 // what VRAD holds is subtracted
-                format!("{file} {time} {}\n", -0.15 * (2.1 * night * night).sin() - 0.1 * orbit)
+                format!("{file} {time} {}\n", 0.15 * (2.1 * night * night).sin() + sign * 0.07 * orbit)
             }
-            _ => format!("{line}\n"),
+            _ => "# file  time_d  vrad_kms\n".to_owned(),
         };
-        list.lines().map(with_offset).collect()
-    });
+        desk.edit("data/observations.txt", |list| list.lines().map(with_offset).collect());
+    };
     star["observations"] = json!({ "path": "data/observations.txt" });
     desk.write("star.json", &star.to_string());
+    offset(1.0);
     let said = desk.succeed(&["periodogram", "star.json", "--draws", "1000", "--out", "search"]);
     println!("{said}");
     says(&said, &["Known planet: candidate", "not significant beside RV offsets of nights"]);
     let beside = &desk.json("search/periodogram.json")["robustness"]["night_offsets"];
     assert!(number(&beside["sigma_kms"]) > 0.08 && number(&beside["false_alarm_probability"]) > 0.01, "{beside}");
+
+    // as if the planet were on the other side: it predicts nothing
+    offset(-1.0);
+    let said = desk.succeed(&["periodogram", "star.json", "--draws", "1000", "--out", "other"]);
+    says(&said, &["Known planet: not detected", "K of the known planet is negative at "]);
+    let file = desk.json("other/periodogram.json");
+    assert_eq!(number(&file["robustness"]["held_out_nights"]["delta_ln_p"]), 0.0);
+    assert_eq!(file["robustness"]["night_offsets"], json!(null));
 }

@@ -81,7 +81,7 @@ impl Tried<'_> {
         }
     }
 
-    /// Velocities of such an orbit (km/s).
+    /// Velocities of such an orbit (km/s); none where K is below 0, as its height is.
     fn velocities(&self, orbit: &CircularOrbit, cycles: &[f64]) -> DVector<f64> {
         let CircularOrbit { k_kms, phi, .. } = *orbit;
         match self {
@@ -89,7 +89,7 @@ impl Tried<'_> {
                 let orbit = Orbit { k_kms, porb_over_prot: peak.porb_over_prot, phi };
                 DVector::from_iterator(cycles.len(), orbit.velocities_kms(cycles))
             }
-            Tried::Known(planet) => k_kms * planet.ephemeris.unit_velocities(cycles),
+            Tried::Known(planet) => k_kms.max(0.0) * planet.ephemeris.unit_velocities(cycles),
         }
     }
 }

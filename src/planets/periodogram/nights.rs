@@ -296,7 +296,6 @@ mod tests {
             .collect();
         all.sort_by(f64::total_cmp);
         let half = all.partition_point(|p| *p < 0.5);
-        println!("{} {half} {:?}", all.len(), &all[..12]);
         // half of the draws are below zero, and have 1; exceeded once in a hundred by chance: 1.63 / sqrt(200)
         let distance = |(k, p): (usize, &f64)| ((k as f64 + 0.5) / all.len() as f64 - p).abs();
         let distance = all[..half].iter().enumerate().map(distance).fold(0.0, f64::max);
