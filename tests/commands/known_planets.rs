@@ -85,7 +85,7 @@ fn two_known_planets_are_judged_together_and_a_third_is_found_beside_them() {
     assert!((number(&first["k_kms"]) - K_KMS[1]).abs() < 4.0 * number(&first["sigma_k_kms"]), "{first}");
 }
 
-/// RV offsets from night to night that are larger where the planet would be receding.
+/// RV offsets from night to night, by chance larger where the planet would be receding.
 #[test]
 fn a_known_planet_is_compared_with_offsets_of_nights() {
     let mut star = config();
@@ -94,34 +94,29 @@ fn a_known_planet_is_compared_with_offsets_of_nights() {
         section.retain(|key, _| !["k2_kms", "period2_d", "t_conjunction2_d"].contains(&key.as_str()));
     }
     star["planet"]["k_kms"] = json!(0.0);
+    star["observations"]["simulate"]["schedule"]["nights"] = json!(8);
+    star["observations"]["simulate"]["schedule"]["per_night"] = json!([4, 4]);
     let desk = Desk::new(star.clone());
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
-    let offset = |sign: f64| {
-        let with_offset = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
-            [file, time, ..] if file != "#" => {
-                let night = time.parse::<f64>().unwrap().round();
-                let orbit = (std::f64::consts::TAU * (night - CONJUNCTIONS_D[0]) / PERIODS_D[0]).sin();
-                // what VRAD holds is subtracted
-                format!("{file} {time} {}\n", 0.15 * (2.1 * night * night).sin() + sign * 0.07 * orbit)
-            }
-            _ => "# file  time_d  vrad_kms\n".to_owned(),
-        };
-        desk.edit("data/observations.txt", |list| list.lines().map(with_offset).collect());
+    let with_offset = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+        [file, time] if file != "#" => {
+            let night = time.parse::<f64>().unwrap().round();
+            let orbit = (std::f64::consts::TAU * (night - CONJUNCTIONS_D[0]) / PERIODS_D[0]).sin();
+            // what VRAD holds is subtracted
+            format!("{file} {time} {}\n", 0.15 * (1.3 * night * night + 1.0).sin() + 0.06 * orbit)
+        }
+        _ => "# file  time_d  vrad_kms\n".to_owned(),
     };
+    desk.edit("data/observations.txt", |list| list.lines().map(with_offset).collect());
     star["observations"] = json!({ "path": "data/observations.txt" });
+    // nothing is fitted that takes long
+    star["star"]["regions"] = json!({ "area": 0.0 });
+    star["star"]["fitted"] = json!([]);
+    star["imaging"]["pixels"] = json!(200);
     desk.write("star.json", &star.to_string());
-    offset(1.0);
     let said = desk.succeed(&["periodogram", "star.json", "--draws", "1000", "--out", "search"]);
     println!("{said}");
-    says(&said, &["Known planet: candidate", "not significant beside RV offsets of nights"]);
+    says(&said, &["Known planet: marginal. ", "one-sided p = 0.00", "not significant beside RV offsets of nights"]);
     let beside = &desk.json("search/periodogram.json")["robustness"]["night_offsets"];
-    assert!(number(&beside["sigma_kms"]) > 0.08 && number(&beside["false_alarm_probability"]) > 0.01, "{beside}");
-
-    // as if the planet were on the other side: it predicts nothing
-    offset(-1.0);
-    let said = desk.succeed(&["periodogram", "star.json", "--draws", "1000", "--out", "other"]);
-    says(&said, &["Known planet: not detected", "K of the known planet is negative at "]);
-    let file = desk.json("other/periodogram.json");
-    assert_eq!(number(&file["robustness"]["held_out_nights"]["delta_ln_p"]), 0.0);
-    assert_eq!(file["robustness"]["night_offsets"], json!(null));
+    assert!(number(&beside["sigma_kms"]) > 0.03 && number(&beside["false_alarm_probability"]) > 0.05, "{beside}");
 }

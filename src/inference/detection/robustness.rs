@@ -240,11 +240,22 @@ impl Robustness {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Clock, Ephemeris};
 
     #[test]
     fn nights_end_with_gaps() {
         let found = nights(&[5.01, 3.2, 3.0, 5.2, 3.45, 9.0], NIGHT_GAP_D);
         assert_eq!(found, vec![vec![2, 1, 4], vec![0, 3], vec![5]]);
+    }
+
+    #[test]
+    fn a_known_planet_of_negative_k_predicts_nothing() {
+        let clock = Clock { rotation_period_d: 2.0, epoch_d: 0.0 };
+        let ephemeris = Ephemeris { planet: 0, conjunction_d: [5.0, 0.0], period_d: [7.0, 0.0], shape: None, clock };
+        let planet = KnownPlanet { ephemeris, alone: [-0.1, 0.02], k: None };
+        let velocity = |k_kms| Tried::Known(&planet).velocities(&orbit(k_kms, 0.02, 0.0).unwrap(), &[0.3])[0];
+        assert_eq!(velocity(-0.1), 0.0);
+        assert!(velocity(0.1).abs() > 0.01);
     }
 
     fn orbit(k_kms: f64, sigma_k_kms: f64, delta_ln_l: f64) -> Option<CircularOrbit> {
