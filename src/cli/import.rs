@@ -6,7 +6,7 @@ use super::signals::{RESULT, Signals};
 use super::{Failure, Global, console, progress};
 use crate::data::import::Import;
 use crate::data::init::{List, Place, propose};
-use crate::data::io::atomic::folder_of;
+use crate::data::io::atomic::{self, folder_of};
 use crate::data::io::zdipy::{Input, LINE_FILE, LocalLineFile};
 use crate::numerics::text::shown;
 use std::path::{Path, PathBuf};
@@ -57,11 +57,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal.map_err(|error| args.known.failure(error, &args.input))?;
-    args.output.check(Some(&list))?;
+    let _lock = args.output.claim(Some(&list))?;
     signals.defer();
     // the list first, so that where the config is its observations are
-    args.output.write(&list, &import.list)?;
-    args.output.write(config, &proposal.json)?;
+    atomic::write(&list, import.list.as_bytes())?;
+    atomic::write(config, proposal.json.as_bytes())?;
     let (table, left_out) = (proposal.table(), import.table());
     let written = format!("written: {}, {}", shown(config), shown(&list));
     console::print(format_args!("{table}\n{left_out}{}{written}\n", if left_out.is_empty() { "" } else { "\n" }));

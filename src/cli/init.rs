@@ -7,7 +7,7 @@ use crate::data::config::{ConfigError, IndicatorSection, Spectrograph};
 use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, LightCurve, List, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
-use crate::data::io::{FileError, lsd};
+use crate::data::io::{FileError, atomic, lsd};
 use crate::numerics::text::shown;
 use crate::star::BrightnessModel;
 use crate::surface::ObjectiveKind;
@@ -249,9 +249,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = args.proposal(&|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal?;
-    args.output.check(None)?;
+    let _lock = args.output.claim(None)?;
     signals.defer();
-    args.output.write(args.output.path(), &proposal.json)?;
+    atomic::write(args.output.path(), proposal.json.as_bytes())?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));
     next_commands(&proposal, args.output.path());
     Ok(())

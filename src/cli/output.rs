@@ -5,10 +5,10 @@
 
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
-use crate::data::io::atomic::{self, WriteError, clear_abandoned, folder_of};
+use crate::data::io::atomic::{clear_abandoned, folder_of, lock_folder};
 use crate::data::scene::{Scene, SceneError};
 use crate::runs::{fitted, grid_scan, run};
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::ErrorKind;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -133,11 +133,8 @@ impl Output {
         let folder = self.folder.display();
         let failed = |e| Failure::failed(format!("--out {folder}: cannot be created: {e}"));
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
-        let claimed = Claimed { folder: &self.folder, lock: File::open(&self.folder).ok() };
-        if let Some(Err(TryLockError::WouldBlock)) = claimed.lock.as_ref().map(File::try_lock) {
-            return Err(Failure::failed(format!("--out {folder}: another process is writing there")));
-        }
-        // another may have ended meanwhile
+        let claimed = Claimed { folder: &self.folder, _lock: lock_folder(&self.folder) };
+        // another process may have written there meanwhile
         self.check()?;
         Ok(claimed)
     }
@@ -147,7 +144,7 @@ impl Output {
 #[derive(Debug)]
 pub struct Claimed<'a> {
     folder: &'a Path,
-    lock: Option<File>,
+    _lock: Option<File>,
 }
 
 impl Deref for Claimed<'_> {
@@ -200,9 +197,11 @@ impl ConfigFile {
         }
     }
 
-    /// Writes the config, or the other file that comes with it.
-    pub fn write(&self, file: &Path, text: &str) -> Result<(), WriteError> {
-        atomic::write_over(file, text.as_bytes(), self.force)
+    /// The same once more when they are there to be written, no other process being about to while the lock lives.
+    pub fn claim(&self, other: Option<&Path>) -> Result<Option<File>, Failure> {
+        let lock = lock_folder(folder_of(&self.path));
+        self.check(other)?;
+        Ok(lock)
     }
 
     /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever

@@ -36,25 +36,34 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         several => several[0].parent().unwrap_or(Path::new("")).join("report.html"),
     };
     let file = args.out.clone().unwrap_or_else(usual);
+    check(&file, args.force)?;
+    let page = report::report(&args.folders)?;
+    signals.defer();
+    // another process may have written it meanwhile
+    let _lock = atomic::lock_folder(atomic::folder_of(&file));
+    check(&file, args.force)?;
+    atomic::write(&file, page.as_bytes())?;
+    Report::default().line("written", file.display()).print();
+    Ok(())
+}
+
+/// Whether the page may be written.
+fn check(file: &Path, force: bool) -> Result<(), Failure> {
     if file.is_dir() {
         return Err(Failure::input(format!("--out {}: is a folder, give the name of a file", file.display())));
     }
-    if file.exists() && !args.force {
+    if file.exists() && !force {
         return Err(Failure::input(format!(
             "--out {}: is there already; give another name, or --force",
             file.display()
         )));
     }
     // nothing that a page is made of
-    if file.exists() && !report::is_page(&file) {
+    if file.exists() && !report::is_page(file) {
         return Err(Failure::input(format!(
             "--out {}: is there already, and no report: it is not replaced",
             file.display()
         )));
     }
-    let page = report::report(&args.folders)?;
-    signals.defer();
-    atomic::write_over(&file, page.as_bytes(), args.force)?;
-    Report::default().line("written", file.display()).print();
     Ok(())
 }

@@ -234,18 +234,30 @@ fn a_missing_permission_is_a_failure() {
 #[cfg(unix)]
 fn two_processes_do_not_write_into_one_folder() {
     let desk = Desk::new(tiny(60));
-    let other = desk.path("out");
-    std::fs::create_dir(&other).unwrap();
-    let folder = std::fs::File::open(&other).unwrap();
+    std::fs::create_dir(desk.path("out")).unwrap();
+    let folder = std::fs::File::open(desk.path("out")).unwrap();
     folder.lock().unwrap();
-    for force in [&["--force"][..], &[]] {
-        let output = dimcmc(&[&["simulate", "config.json", "--out", "out"], force].concat(), &desk.path(""));
-        assert_eq!(output.status.code(), Some(1));
-        says(&text(&output.stderr), &["error: --out out: another process is writing there"]);
-    }
-    assert!(std::fs::read_dir(&other).unwrap().next().is_none());
+    let mut second = desk.start(&["simulate", "config.json", "--out", "out"]);
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(second.try_wait().unwrap().is_none(), "it waits");
+    assert!(std::fs::read_dir(desk.path("out")).unwrap().next().is_none());
+    // what the first has written by then stays
+    desk.write("out/truth.json", "precious");
     drop(folder);
-    desk.succeed(&["simulate", "config.json", "--out", "out"]);
+    let output = second.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    says(&text(&output.stderr), &["error: --out out: the folder is not empty; give another one, or --force"]);
+    assert_eq!(desk.read("out/truth.json"), "precious");
+    // as for files by themselves
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    let folder = std::fs::File::open(desk.path("")).unwrap();
+    folder.lock().unwrap();
+    let second = desk.start(&["init", "data/observations.txt", "--objective", "spottedness", "--out", "star.json"]);
+    std::thread::sleep(Duration::from_secs(1));
+    desk.write("star.json", "precious");
+    drop(folder);
+    says(&text(&second.wait_with_output().unwrap().stderr), &["error: --out star.json: star.json exists"]);
+    assert_eq!(desk.read("star.json"), "precious");
 }
 
 #[test]

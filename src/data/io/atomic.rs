@@ -42,14 +42,6 @@ const ABANDONED: Duration = Duration::from_secs(3600);
 /// # Errors
 /// A folder that is not there or cannot be written to, a full disc.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    write_over(path, bytes, true)
-}
-
-/// Writes `bytes` to `path`; a file that is there is replaced only if `replace`.
-///
-/// # Errors
-/// As [`write()`], and a file that is not to be replaced.
-pub fn write_over(path: &Path, bytes: &[u8], replace: bool) -> Result<(), WriteError> {
     if !is_staged(path) {
         clear(folder_of(path), |of| Some(of) == path.file_name());
     }
@@ -57,28 +49,13 @@ pub fn write_over(path: &Path, bytes: &[u8], replace: bool) -> Result<(), WriteE
     let written = File::create(&temporary).and_then(|mut file| {
         // without locks on this file system its age has to say whether it is abandoned
         let _ = file.try_lock();
-        file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| into_place(&temporary, path, replace))
+        file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| std::fs::rename(&temporary, path))
     });
     written.map_err(|source| {
         // What is wrong with the file itself is what matters; that its torn half may stay does not.
         let _ = std::fs::remove_file(&temporary);
         WriteError { path: path.into(), source }
     })
-}
-
-/// Renames a whole file, onto another one only if `replace`.
-fn into_place(from: &Path, to: &Path, replace: bool) -> std::io::Result<()> {
-    if !replace {
-        match std::fs::hard_link(from, to) {
-            Ok(()) => return std::fs::remove_file(from),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                return Err(std::io::Error::new(error.kind(), "another process has written it meanwhile"));
-            }
-            // a file system without links
-            Err(_) => {}
-        }
-    }
-    std::fs::rename(from, to)
 }
 
 /// Writes a set of files into `folder`, which must exist: `fill` makes them in the folder that it is given, and files
@@ -115,6 +92,13 @@ pub fn write_folder(path: &Path, fill: &dyn Fn(&Path) -> std::io::Result<()>) ->
         Err(_) => std::fs::rename(&new, path),
     };
     fill(&new).and_then(|()| replace()).map_err(|source| WriteError { path: path.into(), source })
+}
+
+/// Waits until no other process brings results into `folder`; as long as the lock lives, none does. `None` on a system or
+/// a file system that cannot lock folders.
+pub fn lock_folder(folder: &Path) -> Option<File> {
+    let folder = File::open(folder).ok()?;
+    folder.lock().ok().map(|()| folder)
 }
 
 /// Removes from `folder` what writers that live no more have left half-written, and brings whole sets to their place.
@@ -272,16 +256,6 @@ mod tests {
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
         let error = write(&dir.path().join("absent/x.json"), b"").unwrap_err().to_string();
         assert!(error.contains("absent/x.json: cannot write"), "{error}");
-    }
-
-    #[test]
-    fn replaces_nothing_that_it_is_not_told_to() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("x.json");
-        write_over(&path, b"one", false).unwrap();
-        let error = write_over(&path, b"two", false).unwrap_err();
-        assert_eq!(error.source.kind(), ErrorKind::AlreadyExists);
-        assert_eq!((names(dir.path()), std::fs::read_to_string(&path).unwrap()), (vec!["x.json".into()], "one".into()));
     }
 
     #[test]

@@ -104,7 +104,9 @@ pub enum ExportError {
 /// [`ExportError`].
 pub fn write(contents: &Contents, format: Format, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
     check(contents, format, out, replace)?;
-    place::create_parent(out)?;
+    let _lock = place::lock_parent(out)?;
+    // another process may have written it meanwhile
+    check(contents, format, out, replace)?;
     match format {
         Format::Zarr => zarr::write(contents, out)?,
         Format::Emcee => emcee::write(contents, out)?,

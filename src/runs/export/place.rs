@@ -1,7 +1,8 @@
 //! Where an export goes: nothing that is there is lost unless it is an earlier export and the user insists.
 
 use super::ExportError;
-use crate::data::io::atomic::{WriteError, clear_abandoned};
+use crate::data::io::atomic::{WriteError, clear_abandoned, folder_of, lock_folder};
+use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -53,11 +54,11 @@ pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool
     }
 }
 
-/// Makes the folder that the export goes into.
-pub fn create_parent(out: &Path) -> Result<(), ExportError> {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let made = folder.map_or(Ok(()), std::fs::create_dir_all);
-    made.map_err(|source| WriteError { path: out.to_owned(), source }.into())
+/// Makes the folder that the export goes into; no other process writes there while the lock lives.
+pub fn lock_parent(out: &Path) -> Result<Option<File>, ExportError> {
+    let folder = folder_of(out);
+    std::fs::create_dir_all(folder).map_err(|source| WriteError { path: out.to_owned(), source })?;
+    Ok(lock_folder(folder))
 }
 
 /// Whether the file begins so.
