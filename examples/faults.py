@@ -244,7 +244,9 @@ class Command:
             shutil.rmtree(folder / "out")
             (folder / "out").mkdir()
             done = self.run(self.words, folder, DIMCMC_CACHE=str(folder / "cache"))
-            line = self.compared(folder, "ended" if done.returncode == 0 else "failed")
+            if done.returncode != 0:
+                return {"same": 0, "problem": f"the second time: {done.stderr.strip()[-200:]}"}
+            line = self.compared(folder, "ended")
         return line
 
     def once_more(self, folder, second):

@@ -130,8 +130,8 @@ impl Output {
 
     /// The folder, created if need be.
     pub fn create(&self) -> Result<Claimed<'_>, Failure> {
-        let folder = self.folder.display();
-        let failed = |e| Failure::failed(format!("--out {folder}: cannot be created: {e}"));
+        self.check()?;
+        let failed = |e| Failure::failed(format!("--out {}: cannot be created: {e}", self.folder.display()));
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         let claimed = Claimed { folder: &self.folder, _lock: lock_folder(&self.folder) };
         // another process may have written there meanwhile
@@ -140,7 +140,7 @@ impl Output {
     }
 }
 
-/// A folder into which no other process writes, where the system can lock folders.
+/// A folder that is [locked](lock_folder), where that is possible.
 #[derive(Debug)]
 pub struct Claimed<'a> {
     folder: &'a Path,

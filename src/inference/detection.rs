@@ -100,7 +100,7 @@ pub struct Detection {
     /// Planets of known ephemeris.
     pub known: KnownPlanets,
     /// The likelihood of the velocities of the star without these; `None` where there are none.
-    alone: Option<Jitters>,
+    alone: Option<Alone>,
     /// Without a planet but those.
     pub planet_free: Linearised,
     /// The same without its jitter, where the profiles say how large that is: what `blind` is of.
@@ -154,13 +154,22 @@ fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
     trials.iter().filter_map(|trial| Some(trial.orbit?.delta_ln_l)).fold(0.0, f64::max)
 }
 
+/// The star as it is without the planets of known ephemeris.
+#[derive(Clone, Debug)]
+pub struct Alone {
+    /// The likelihood of its velocities.
+    jitters: Jitters,
+    /// The star without its jitter, where the profiles say how large that is.
+    without_jitter: Option<WithoutJitter>,
+}
+
 /// A star without a planet, and the blind search for one there.
 #[derive(Clone, Debug)]
 pub struct PlanetFree {
     /// Planets of known ephemeris, which it has.
     pub known: KnownPlanets,
     /// The likelihood of the velocities of the star without these; `None` where there are none.
-    pub alone: Option<Jitters>,
+    pub alone: Option<Alone>,
     /// The star.
     pub here: Linearised,
     /// The same without its jitter, where the profiles say how large that is.
@@ -190,13 +199,13 @@ impl PlanetFree {
         }
         report(Stage::Known);
         let without_jitter = surface.without_jitter(at, &here)?;
-        let alone = none.jitters(&here, without_jitter.as_ref());
+        let jitters = none.jitters(&here, without_jitter.as_ref());
         let known = KnownPlanets::absent(&settings.known, &here, without_jitter.as_ref());
         known.write(&mut at.values);
         let here = known.whole(surface.linearise(at, Some(&here))?, &at.values);
         let known = known.present(&here.quadratic);
         let found = PlanetFree::of(surface, at, (here, known), frequencies, settings.search, report)?;
-        Ok(PlanetFree { alone: Some(alone), ..found })
+        Ok(PlanetFree { alone: Some(Alone { jitters, without_jitter }), ..found })
     }
 
     /// Of the star in `at`, without an orbit but those of `known` planets, that is linearised `here`.
@@ -287,7 +296,10 @@ impl Detection {
     /// The likelihood of the velocities of the star without a planet, known ones included.
     pub fn jitters(&self) -> Jitters {
         let none = KnownPlanets::default();
-        self.alone.clone().unwrap_or_else(|| none.jitters(&self.planet_free, self.without_jitter.as_ref()))
+        match &self.alone {
+            Some(alone) => alone.jitters.clone(),
+            None => none.jitters(&self.planet_free, self.without_jitter.as_ref()),
+        }
     }
 
     /// The last expansion.

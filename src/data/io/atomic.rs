@@ -9,7 +9,7 @@ use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A file that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +36,10 @@ const WHOLE: &str = "whole";
 
 /// On a file system without locks, what nobody has touched for so long is abandoned.
 const ABANDONED: Duration = Duration::from_secs(3600);
+
+/// How long a folder is waited for, and between two tries.
+const LONGEST: Duration = Duration::from_secs(10);
+const PAUSE: Duration = Duration::from_millis(5);
 
 /// Writes `bytes` to `path`, in place of whatever is there.
 ///
@@ -94,11 +98,19 @@ pub fn write_folder(path: &Path, fill: &dyn Fn(&Path) -> std::io::Result<()>) ->
     fill(&new).and_then(|()| replace()).map_err(|source| WriteError { path: path.into(), source })
 }
 
-/// Waits until no other process brings results into `folder`; as long as the lock lives, none does. `None` on a system or
-/// a file system that cannot lock folders.
+/// Waits until no other command that writes its results in one go brings them into `folder`; as long as the lock lives,
+/// none does. `None` where folders cannot be locked, and where one is locked for longer than bringing files takes.
 pub fn lock_folder(folder: &Path) -> Option<File> {
-    let folder = File::open(folder).ok()?;
-    folder.lock().ok().map(|()| folder)
+    let (folder, began) = (File::open(folder).ok()?, Instant::now());
+    loop {
+        match folder.try_lock() {
+            Ok(()) => return Some(folder),
+            Err(TryLockError::WouldBlock) if began.elapsed() < LONGEST => {}
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Interrupted => {}
+            Err(_) => return None,
+        }
+        std::thread::sleep(PAUSE);
+    }
 }
 
 /// Removes from `folder` what writers that live no more have left half-written, and brings whole sets to their place.

@@ -177,19 +177,21 @@ pub fn beside_night_offsets(
     found: &Detection,
     tried: Tried,
 ) -> Option<NightOffsets> {
-    let WithoutJitter { here, found_kms, scale_kms } = found.without_jitter.as_ref()?;
     let nights = imager.nights_of_sets();
-    let beside = |velocities: &VelocityQuadratic, planet: Compared| {
-        night_offsets(velocities, &nights, (*found_kms, *scale_kms), planet, settings)
-    };
     match tried {
         Tried::Peak(_) if found.is_candidate() => {
+            let WithoutJitter { here, found_kms, scale_kms } = found.without_jitter.as_ref()?;
+            let velocities = found.known.beside(&here.quadratic);
             let peak = Compared::Peak(1.0 / found.blind.best().porb_over_prot, &found.frequencies);
-            beside(&found.known.beside(&here.quadratic), peak)
+            night_offsets(&velocities, &nights, (*found_kms, *scale_kms), peak, settings)
         }
+        // its significance is that of the star without it
         Tried::Known(planet) if planet.is_candidate() => {
+            let alone = found.alone.as_ref()?;
+            let WithoutJitter { here, found_kms, scale_kms } = alone.without_jitter.as_ref()?;
             let velocities = found.known.beside_others(planet, &here.quadratic);
-            beside(&velocities, Compared::Known(&planet.ephemeris.unit_velocities(&velocities.cycles)))
+            let unit = planet.ephemeris.unit_velocities(&velocities.cycles);
+            night_offsets(&velocities, &nights, (*found_kms, *scale_kms), Compared::Known(&unit), settings)
         }
         _ => None,
     }

@@ -324,7 +324,7 @@ pub struct RobustnessRecord {
     /// The sum over them of what the planet adds to their prediction; null for less than two nights.
     #[serde(default)]
     pub held_out_nights: Option<HeldOut>,
-    /// What RV offsets of nights make of a candidate.
+    /// What RV offsets of nights make of a candidate, or of a known planet that would be one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_offsets: Option<NightOffsets>,
 }

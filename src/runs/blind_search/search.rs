@@ -98,16 +98,20 @@ impl<'a> BlindSearch<'a> {
         let of_the_star = detection.of_the_star(&evidence);
         let why_not = scene.measured.problem().or_else(|| detection.not_judged());
         let judged = |verdict: Verdict| why_not.as_ref().map_or(verdict, Verdict::not_judged);
-        let verdict_on = |planet: &KnownPlanet| {
-            let mut remarks = of_the_star.clone();
-            if options.robustness != RobustnessOf::None && Some(planet) != first {
-                let tried = Tried::Known(planet);
-                let beside = beside_night_offsets(imager, settings.search, &detection, tried);
-                remarks.extend(beside.and_then(of_night_offsets));
+        let mut known = Vec::new();
+        for planet in &detection.known.planets {
+            let mut against = of_the_star.clone();
+            // the first one is tried out
+            if options.robustness != RobustnessOf::None && first.is_none_or(|first| !std::ptr::eq(first, planet)) {
+                let beside = beside_night_offsets(imager, settings.search, &detection, Tried::Known(planet));
+                let offsets = beside.and_then(of_night_offsets);
+                let number = planet.ephemeris.planet + 1;
+                let said = |remark: &Remark| Remark::note(format!("Known planet {number}: {}", remark.text));
+                remarks.extend(offsets.as_ref().map(said));
+                against.extend(offsets);
             }
-            judged(known(planet, detection.known.planets.len(), &remarks))
-        };
-        let known: Vec<Verdict> = detection.known.planets.iter().map(verdict_on).collect();
+            known.push(judged(verdict_on(planet, detection.known.planets.len(), &against)));
+        }
         let mut verdict = detection.verdict(&remarks);
         let mut blind = None;
         if first.is_some() {
@@ -117,6 +121,7 @@ impl<'a> BlindSearch<'a> {
             let of_the_peak = detection.of_the_peak(tried.as_ref());
             blind = Some(detection.verdict(&[of_the_star, of_the_peak.clone()].concat()));
             verdict = known[0].clone().with(&remarks);
+            known[0] = judged(verdict.clone());
             let said = |remark: Remark| Remark::note(format!("Blind search: {}", remark.text));
             remarks.extend(of_the_peak.into_iter().map(said));
             remarks.extend(of_a_companion(&detection));
@@ -172,7 +177,7 @@ fn of_a_companion(detection: &Detection) -> Option<Remark> {
 }
 
 /// What is said of a planet of known ephemeris, one of so many, beside the remarks on its star.
-fn known(planet: &KnownPlanet, of: usize, remarks: &[Remark]) -> Verdict {
+fn verdict_on(planet: &KnownPlanet, of: usize, remarks: &[Remark]) -> Verdict {
     let Some(k) = planet.k else { return Verdict::not_judged(UNBOUNDED) };
     let [k_kms, sigma_k_kms] = k.moments;
     let signal = Signal { period_d: planet.ephemeris.period_d[0], sigma_period_d: None, k_kms, sigma_k_kms };
