@@ -266,7 +266,8 @@ class Command:
 
     def compared(self, folder, second):
         found = files(folder / "out")
-        differ = sorted(key for key in found.keys() | self.reference.keys() if found.get(key) != self.reference.get(key))
+        names = found.keys() | self.reference.keys()
+        differ = sorted(name for name in names if found.get(name) != self.reference.get(name))
         return {"second": second, "same": int(not differ), "problem": " ".join(differ)}
 
 
@@ -299,7 +300,7 @@ class Bench:
         return [self.python, "-c", statement(words)]
 
     def by_ranks(self, words):
-        return ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-n", "2", self.program, *words]
+        return [*"mpirun --oversubscribe --allow-run-as-root --bind-to none -n 2".split(), self.program, *words]
 
     def prepare(self):
         shutil.rmtree(self.inputs, ignore_errors=True)
@@ -391,7 +392,8 @@ if __name__ == "__main__":
                 command = Command(bench, name, functools.partial(start, bench))
                 for _ in range(-(-times // len(names))):
                     share = rng.random()
-                    line = {"command": name, "fault": fault, "at": f"{share:.3f}", "of_seconds": f"{command.seconds:.2f}"}
+                    line = {"command": name, "fault": fault, "at": f"{share:.3f}"}
+                    line["of_seconds"] = f"{command.seconds:.2f}"
                     calibration_table.append(args.csv, COLUMNS, line | disturb(command, rng, share))
     else:
         parser.error("--program, --python, or --table")

@@ -55,9 +55,9 @@ pub enum Compared<'a> {
     Known(&'a DVector<f64>),
 }
 
-/// What offsets of `nights` make of a planet, beside a jitter which is `found_kms` in a star without it and has a prior of that
-/// scale; the offsets have the same prior, or that of 30 m/s. `None` where the profiles do not tell the offsets from a
-/// jitter, show none, or no orbit is bounded.
+/// What offsets of `nights` make of a planet, beside a jitter which is `found_kms` in a star without it and has a prior
+/// of that scale; the offsets have the same prior, or that of 30 m/s. `None` where the profiles do not tell the offsets
+/// from a jitter, show none, or no orbit is bounded.
 pub fn night_offsets(
     without: &VelocityQuadratic,
     nights: &[Vec<usize>],
