@@ -112,6 +112,12 @@ struct Taken {
     marginal: Arc<Marginal>,
 }
 
+/// The star of a campaign: one of which profiles have been taken, or one that is simulated.
+enum Star<'a> {
+    Observed(&'a Taken),
+    Simulated(Dataset),
+}
+
 impl Campaign {
     /// The campaign that `config` asks for, or one for each of these numbers of `nights` (of a season).
     ///
@@ -151,27 +157,28 @@ impl Campaign {
         wanted: Option<usize>,
     ) -> Result<Self, CampaignError> {
         let settings = ahead::with_nights(config, wanted)?.settings()?;
-        let data = if taken.is_some() { None } else { Some(Dataset::read(&settings)?) };
-        let mut ahead = match (taken, &data) {
-            (Some(Taken { scene, .. }), _) => ahead::planned(scene, &settings, own, wanted)?,
-            (None, Some(data)) => ahead::simulated(config, &settings, data, wanted)?,
-            (None, None) => Vec::new(),
+        let star = match taken {
+            Some(taken) => Star::Observed(taken),
+            None => Star::Simulated(Dataset::read(&settings)?),
         };
-        let mut parts = match taken {
-            Some(Taken { scene, .. }) => of_sets(&scene.imager, &scene.observations),
-            None => vec![Observations { profiles: Vec::new() }; settings.sets.len()],
+        let mut ahead = match &star {
+            Star::Observed(Taken { scene, .. }) => ahead::planned(scene, &settings, own, wanted)?,
+            Star::Simulated(data) => ahead::simulated(config, &settings, data, wanted)?,
+        };
+        let mut parts = match &star {
+            Star::Observed(Taken { scene, .. }) => of_sets(&scene.imager, &scene.observations),
+            Star::Simulated(_) => vec![Observations { profiles: Vec::new() }; settings.sets.len()],
         };
         let before: Vec<usize> = parts.iter().map(|part| part.profiles.len()).collect();
         ahead.iter().for_each(|ahead| parts[ahead.set].profiles.extend(ahead.profiles.iter().cloned()));
-        let (mut imager, settings) = match (taken, data) {
-            (Some(Taken { scene, .. }), _) => {
+        let (mut imager, settings) = match &star {
+            Star::Observed(Taken { scene, .. }) => {
                 let scene = scene.with_parts(parts.clone())?;
                 (scene.imager, scene.settings)
             }
-            (None, data) => {
+            Star::Simulated(data) => {
                 let mut imager = imager(&settings, &settings.sets, &parts, &[])?;
-                let of = |data| light_curves(&settings, &data, &parts);
-                imager.light_curves = data.map(of).transpose()?.unwrap_or_default();
+                imager.light_curves = light_curves(&settings, data, &parts)?;
                 (imager, settings)
             }
         };
