@@ -57,7 +57,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal.map_err(|error| args.known.failure(error, &args.input))?;
-    let _lock = args.output.claim(Some(&list))?;
+    let _claimed = args.output.claim(Some(&list))?;
     signals.defer();
     // the list first, so that where the config is its observations are
     atomic::write(&list, import.list.as_bytes())?;

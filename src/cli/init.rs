@@ -249,7 +249,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = args.proposal(&|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
     let proposal = proposal?;
-    let _lock = args.output.claim(None)?;
+    let _claimed = args.output.claim(None)?;
     signals.defer();
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));

@@ -5,12 +5,10 @@
 
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
-use crate::data::io::atomic::{clear_abandoned, folder_of, lock_folder};
+use crate::data::io::atomic::{Claimed, clear_abandoned, folder_of};
 use crate::data::scene::{Scene, SceneError};
 use crate::runs::{fitted, grid_scan, run};
-use std::fs::File;
 use std::io::ErrorKind;
-use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 /// The observations of a config, after a note on its assumed objective.
@@ -129,29 +127,11 @@ impl Output {
     }
 
     /// The folder, created if need be.
-    pub fn create(&self) -> Result<Claimed<'_>, Failure> {
+    pub fn create(&self) -> Result<Claimed, Failure> {
         self.check()?;
         let failed = |e| Failure::failed(format!("--out {}: cannot be created: {e}", self.folder.display()));
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
-        let claimed = Claimed { folder: &self.folder, _lock: lock_folder(&self.folder) };
-        // another process may have written there meanwhile
-        self.check()?;
-        Ok(claimed)
-    }
-}
-
-/// A folder that is [locked](lock_folder), where that is possible.
-#[derive(Debug)]
-pub struct Claimed<'a> {
-    folder: &'a Path,
-    _lock: Option<File>,
-}
-
-impl Deref for Claimed<'_> {
-    type Target = Path;
-
-    fn deref(&self) -> &Path {
-        self.folder
+        Claimed::folder(&self.folder, || self.check())
     }
 }
 
@@ -198,10 +178,8 @@ impl ConfigFile {
     }
 
     /// The same once more when they are there to be written, no other process being about to while the lock lives.
-    pub fn claim(&self, other: Option<&Path>) -> Result<Option<File>, Failure> {
-        let lock = lock_folder(folder_of(&self.path));
-        self.check(other)?;
-        Ok(lock)
+    pub fn claim(&self, other: Option<&Path>) -> Result<Claimed, Failure> {
+        Claimed::folder(folder_of(&self.path), || self.check(other))
     }
 
     /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever

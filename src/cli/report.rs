@@ -3,7 +3,7 @@
 use super::report_lines::Report;
 use super::signals::{RESULT, Signals};
 use super::{Failure, Global};
-use crate::data::io::atomic;
+use crate::data::io::atomic::{self, Claimed};
 use crate::figures::report;
 use std::path::{Path, PathBuf};
 
@@ -39,9 +39,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     check(&file, args.force)?;
     let page = report::report(&args.folders)?;
     signals.defer();
-    // another process may have written it meanwhile
-    let _lock = atomic::lock_folder(atomic::folder_of(&file));
-    check(&file, args.force)?;
+    let _claimed = Claimed::folder(atomic::folder_of(&file), || check(&file, args.force))?;
     atomic::write(&file, page.as_bytes())?;
     Report::default().line("written", file.display()).print();
     Ok(())

@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Write as _};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -98,9 +99,36 @@ pub fn write_folder(path: &Path, fill: &dyn Fn(&Path) -> std::io::Result<()>) ->
     fill(&new).and_then(|()| replace()).map_err(|source| WriteError { path: path.into(), source })
 }
 
-/// Waits until no other command that writes its results in one go brings them into `folder`; as long as the lock lives,
-/// none does. `None` where folders cannot be locked, and where one is locked for longer than bringing files takes.
-pub fn lock_folder(folder: &Path) -> Option<File> {
+/// A folder into which no other command that writes its results in one go brings them as long as this lives.
+#[derive(Debug)]
+pub struct Claimed {
+    folder: PathBuf,
+    _lock: Option<File>,
+}
+
+impl Deref for Claimed {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl Claimed {
+    /// Waits until no other command brings results into `folder`, and asks once more whether they may go there: another
+    /// process may have written there meanwhile. The claim is empty where folders cannot be locked, and where one is
+    /// locked for longer than bringing files takes.
+    ///
+    /// # Errors
+    /// Those of `check`.
+    pub fn folder<E>(folder: &Path, check: impl FnOnce() -> Result<(), E>) -> Result<Self, E> {
+        let claimed = Claimed { folder: folder.to_owned(), _lock: lock(folder) };
+        check()?;
+        Ok(claimed)
+    }
+}
+
+fn lock(folder: &Path) -> Option<File> {
     let (folder, began) = (File::open(folder).ok()?, Instant::now());
     loop {
         match folder.try_lock() {

@@ -103,10 +103,7 @@ pub enum ExportError {
 /// # Errors
 /// [`ExportError`].
 pub fn write(contents: &Contents, format: Format, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
-    check(contents, format, out, replace)?;
-    let _lock = place::lock_parent(out)?;
-    // another process may have written it meanwhile
-    check(contents, format, out, replace)?;
+    let _claimed = place::claim_parent(out, || check(contents, format, out, replace))?;
     match format {
         Format::Zarr => zarr::write(contents, out)?,
         Format::Emcee => emcee::write(contents, out)?,

@@ -1,8 +1,7 @@
 //! Where an export goes: nothing that is there is lost unless it is an earlier export and the user insists.
 
 use super::ExportError;
-use crate::data::io::atomic::{WriteError, clear_abandoned, folder_of, lock_folder};
-use std::fs::File;
+use crate::data::io::atomic::{Claimed, WriteError, clear_abandoned, folder_of};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -54,11 +53,12 @@ pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool
     }
 }
 
-/// Makes the folder that the export goes into; no other process writes there while the lock lives.
-pub fn lock_parent(out: &Path) -> Result<Option<File>, ExportError> {
+/// Makes and claims the folder that the export goes into, if `check` says that it may.
+pub fn claim_parent(out: &Path, check: impl Fn() -> Result<(), ExportError>) -> Result<Claimed, ExportError> {
+    check()?;
     let folder = folder_of(out);
     std::fs::create_dir_all(folder).map_err(|source| WriteError { path: out.to_owned(), source })?;
-    Ok(lock_folder(folder))
+    Claimed::folder(folder, check)
 }
 
 /// Whether the file begins so.

@@ -7,7 +7,7 @@
 mod loss;
 
 use super::ExportError;
-use super::place::{begins_with, check_folder, check_name, lock_parent};
+use super::place::{begins_with, check_folder, check_name, claim_parent};
 use crate::data::io::FileError;
 use crate::data::io::atomic::{self, WriteError, write_set};
 use crate::data::io::csv::{Columns, DATA_SET};
@@ -53,10 +53,7 @@ pub fn write(folder: &Path, out: &Path, replace: bool) -> Result<Vec<PathBuf>, E
     let velocities = Velocities::read(folder, &search)?;
     check_name(out)?;
     let check = || check_folder(out, replace, &|folder| begins_with(&folder.join(README), TITLE.as_bytes()));
-    check()?;
-    let _lock = lock_parent(out)?;
-    // another process may have written it meanwhile
-    check()?;
+    let _claimed = claim_parent(out, check)?;
     std::fs::create_dir_all(out).map_err(|source| WriteError { path: out.into(), source })?;
     let loss = Loss::new(&velocities.times_d, &velocities.covariance, search.best.period_d);
     let files = [
