@@ -38,6 +38,12 @@ impl VelocityQuadratic {
         self.gradient.dot(v) - 0.5 * v.dot(&(&self.information * v))
     }
 
+    /// Counts velocities in that were left out (km/s, of the rotation cycle): what was ln L of 0 is ln L of these.
+    pub fn count_in(&mut self, velocity_kms: impl Fn(f64) -> f64) {
+        let v = DVector::from_iterator(self.len(), self.cycles.iter().map(|cycle| velocity_kms(*cycle)));
+        self.gradient += &self.information * v;
+    }
+
     /// The same with the amplitudes of the columns of `x` (profiles x amplitudes) left free: gradient `Q g`,
     /// information `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). `None` where they are not bounded.
     pub fn beside(&self, x: &DMatrix<f64>) -> Option<Self> {

@@ -1,6 +1,6 @@
 //! Maps of stars that change: they come back at their times, and tell nothing of other times.
 
-use dimcmc::{Config, NoMaps, Observations, Scene, SurfaceMaps};
+use dimcmc::{Config, NoMaps, Observations, Scene, SurfaceMaps, VelocityWithoutSpots};
 use serde_json::json;
 
 /// Rotation cycles of the profiles: four nights of four profiles.
@@ -141,6 +141,25 @@ fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
     let (rms, error) = (counted.summary.rv_rms_kms.unwrap(), counted.summary.rv_error_kms.unwrap());
     assert!((rms / jitter_kms - 1.0).abs() < 0.45, "{rms}");
     assert!(error > 0.9 * jitter_kms, "{error}");
+}
+
+/// Of all planets, as the orbit is that figures draw beside them.
+#[test]
+fn velocities_without_spots_hold_a_second_planet() {
+    let planets = json!({
+        "k_kms": 0.0, "porb_over_prot": 1.7, "phi": 0.5, "k2_kms": 0.5, "porb2_over_prot": 2.3, "phi2": 0.2
+    });
+    let with_two = |config: Config| config.with("planet", planets.clone());
+    let profiles = Scene::new(&with_two(config(&json!([[40.0, 35.0, 22.0, 0.9]]), &cycles()))).unwrap().observations;
+    let known = of_profiles(0.0).with("imaging.spot_lifetime_d", "static").with("imaging.spot_slope", 0.9);
+    let fit = Scene::with_profiles(&with_two(known), profiles).unwrap().maps(None).unwrap();
+    let of = |velocity: &VelocityWithoutSpots| (velocity.marginalised_kms.unwrap(), velocity.moments.orbit_kms);
+    let velocities: Vec<([f64; 2], f64)> = fit.velocities.iter().map(of).collect();
+    assert!(velocities.iter().any(|(_, orbit)| orbit.abs() > 0.4));
+    // within their errors, of which some are as large as the orbit
+    let off = velocities.iter().map(|([rv, sigma], orbit)| ((rv - orbit) / sigma).powi(2)).sum::<f64>();
+    let absent = velocities.iter().map(|([rv, sigma], _)| (rv / sigma).powi(2)).sum::<f64>();
+    assert!(off < 3.0 * velocities.len() as f64 && off < 0.3 * absent, "{off} {absent}");
 }
 
 #[test]

@@ -107,9 +107,7 @@ impl KnownPlanets {
         let second = values.second.filter(|_| self.planets.iter().any(|planet| planet.ephemeris.planet == 1));
         if let Some(second) = second.map(|second| second.eccentric()) {
             for quadratic in [&mut here.quadratic, &mut here.held, &mut here.regularised] {
-                let velocities = quadratic.cycles.iter().map(|cycle| second.velocity_kms(*cycle));
-                let velocities = DVector::from_iterator(quadratic.len(), velocities);
-                quadratic.gradient += &quadratic.information * velocities;
+                quadratic.count_in(|cycle| second.velocity_kms(cycle));
             }
         }
         here

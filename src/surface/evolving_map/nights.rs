@@ -62,7 +62,10 @@ impl SurfaceMaps {
         let mut warnings: Vec<String> = SpotField::of(fitted).remarks().into_iter().map(|remark| remark.text).collect();
         warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
         let against = Against::new(imager, observations, marginal.values, &modelled.depths());
-        let velocities = velocities(&here.held, &against);
+        // of all planets, as the orbit beside them is
+        let mut held = here.held.clone();
+        marginal.values.motion().second.iter().for_each(|second| held.count_in(|cycle| second.velocity_kms(cycle)));
+        let velocities = velocities(&held, &against);
         let [rv, sigma] =
             [0, 1].map(|i| velocities.iter().map(move |v| v.marginalised_kms.map_or(f64::NAN, |rv| rv[i])));
         let per_datum = |modelled: &Modelled| {
