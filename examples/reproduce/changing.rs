@@ -143,7 +143,8 @@ impl Star {
         let settings = DetectionSettings::of(scene.surface(), Vec::new());
         let mut found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
         let change = found.change.take().and_then(Result::ok);
-        let remarks = found.remarks(&Evidence { imager, settings: &settings, robustness: None, misfit: &[] });
+        let evidence = Evidence { imager, settings: &settings, robustness: None, night_offsets: None, misfit: &[] };
+        let remarks = found.remarks(&evidence);
         let [_, porb_over_prot, _] = self.orbit();
         let apart = (1.0 / found.best.porb_over_prot - 1.0 / porb_over_prot).abs() * imager.time_base_cycles();
         let near = |frequency: f64| (1.0 / frequency - 1.0).abs() < NEAR;

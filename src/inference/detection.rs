@@ -15,7 +15,7 @@ mod robustness;
 
 pub use known::{KnownPlanet, KnownPlanets};
 pub use remarks::{Evidence, of_night_offsets};
-pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, beside_night_offsets, robustness};
+pub use robustness::{HeldOut, Robustness, Tried, WithoutNight, robustness};
 
 use crate::model::{Ephemeris, Parameter, ParameterValues};
 use crate::planets::periodogram::eccentric::keplerian;

@@ -90,7 +90,8 @@ fn a_planet_of_a_star_without_spots_is_found() {
     let settings = DetectionSettings::of(scene.surface(), Vec::new());
     let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ()).unwrap();
     assert!(found.last().field.is_some());
-    let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: None, misfit: &[] };
+    let (imager, settings) = (&scene.imager, &settings);
+    let evidence = Evidence { imager, settings, robustness: None, night_offsets: None, misfit: &[] };
     let remarks = found.remarks(&evidence);
     let verdict = found.verdict(&remarks);
     let signal = verdict.signal.unwrap();

@@ -37,6 +37,8 @@ pub struct Evidence<'a> {
     pub settings: &'a DetectionSettings,
     /// Whether the best orbit depends on target or nights, where that was tried.
     pub robustness: Option<&'a Robustness>,
+    /// What RV offsets of nights make of the best orbit.
+    pub night_offsets: Option<NightOffsets>,
     /// What is not like noise in the residuals of the last image.
     pub misfit: &'a [String],
 }
@@ -81,11 +83,13 @@ impl Detection {
         remarks
     }
 
-    /// What is to be said of the highest peak: its period, and whether it depends on a choice that was tried.
-    pub fn of_the_peak(&self, robustness: Option<&Robustness>) -> Vec<Remark> {
+    /// What is to be said of the highest peak: its period, whether it depends on a choice that was tried, and what RV
+    /// offsets of nights make of it.
+    pub fn of_the_peak(&self, robustness: Option<&Robustness>, night_offsets: Option<NightOffsets>) -> Vec<Remark> {
         let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
-        remarks.extend(self.of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
+        remarks.extend(of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
+        remarks.extend(night_offsets.and_then(of_night_offsets));
         if self.highest().on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",
@@ -98,11 +102,12 @@ impl Detection {
     /// What is to be said of the best orbit.
     fn of_the_best_orbit(&self, evidence: &Evidence) -> Vec<Remark> {
         if let Some(planet) = self.known.first() {
-            let mut remarks = self.of_choices(evidence.robustness, planet.orbit().delta_ln_l, KNOWN_LEVEL);
+            let mut remarks = of_choices(evidence.robustness, planet.orbit().delta_ln_l, KNOWN_LEVEL);
+            remarks.extend(evidence.night_offsets.and_then(of_night_offsets));
             remarks.extend(self.of_negative(planet));
             return remarks;
         }
-        let mut remarks = self.of_the_peak(evidence.robustness);
+        let mut remarks = self.of_the_peak(evidence.robustness, evidence.night_offsets);
         if !self.best.on_edge && !self.closed {
             let rounds = self.rounds;
             remarks.push(Remark::against(
@@ -252,30 +257,29 @@ impl Detection {
         let percent = 100.0 * share;
         format!("P = {period_d:.digits$} d{alias} has {percent:.0} % of the posterior (Δln L = -{below:.1})")
     }
+}
 
-    /// Whether an orbit of that `height` depends on a choice; a candidate's is `level` at least.
-    fn of_choices(&self, robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<Remark> {
-        let Some(robustness) = robustness else { return Vec::new() };
-        let mut remarks = Vec::new();
-        if let Some(errors) = robustness.target_matters() {
-            remarks.push(Remark::against(
-                "K depends on the target χ²",
-                format!("K shifts by {errors:.1}σ when imaging.chi2_target changes by 3 %: quote the range."),
-            ));
-        }
-        if let Some(held) = robustness.held_out().filter(|held| height > level && held.delta_ln_p < 0.0) {
-            remarks.push(Remark::against(
-                "held-out nights not predicted better",
-                format!(
-                    "The planet does not improve the prediction of held-out nights: Δln p = {:.1} ± {:.1} ({} nights).",
-                    held.delta_ln_p, held.sigma_delta_ln_p, held.nights
-                ),
-            ));
-        }
-        remarks.extend(decided(&robustness.decisive_nights(level)));
-        remarks.extend(robustness.night_offsets.and_then(of_night_offsets));
-        remarks
+/// Whether an orbit of that `height` depends on a choice; a candidate's is `level` at least.
+fn of_choices(robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<Remark> {
+    let Some(robustness) = robustness else { return Vec::new() };
+    let mut remarks = Vec::new();
+    if let Some(errors) = robustness.target_matters() {
+        remarks.push(Remark::against(
+            "K depends on the target χ²",
+            format!("K shifts by {errors:.1}σ when imaging.chi2_target changes by 3 %: quote the range."),
+        ));
     }
+    if let Some(held) = robustness.held_out().filter(|held| height > level && held.delta_ln_p < 0.0) {
+        remarks.push(Remark::against(
+            "held-out nights not predicted better",
+            format!(
+                "The planet does not improve the prediction of held-out nights: Δln p = {:.1} ± {:.1} ({} nights).",
+                held.delta_ln_p, held.sigma_delta_ln_p, held.nights
+            ),
+        ));
+    }
+    remarks.extend(decided(&robustness.decisive_nights(level)));
+    remarks
 }
 
 /// That a signal is not significant beside such offsets.

@@ -12,7 +12,7 @@ use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::star::observation::{NIGHT_GAP_D, nights};
 use crate::surface::imaging::Imager;
-use crate::surface::{At, AtTarget, WithoutJitter};
+use crate::surface::{At, AtTarget};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -59,8 +59,6 @@ pub struct Robustness {
     pub targets: Vec<AtTarget>,
     /// Without each night, in order of time; empty if the profiles are of one night, or too few.
     pub nights: Vec<WithoutNight>,
-    /// What RV offsets of nights make of it, where it is a candidate beside a fitted jitter.
-    pub night_offsets: Option<NightOffsets>,
 }
 
 /// The orbit that is tried out.
@@ -165,35 +163,31 @@ pub fn robustness(
             delta_ln_p,
         }
     });
-    let night_offsets = beside_night_offsets(imager, settings.search, found, tried);
-    Robustness { all, targets, nights: without.collect(), night_offsets }
+    Robustness { all, targets, nights: without.collect() }
 }
 
-/// What RV offsets of nights make of the highest peak of the blind search, if it is a candidate, or of a known planet
-/// that would be one.
-pub fn beside_night_offsets(
-    imager: &Imager,
-    settings: SearchSettings,
-    found: &Detection,
-    tried: Tried,
-) -> Option<NightOffsets> {
-    let nights = imager.nights_of_sets();
-    match tried {
-        Tried::Peak(_) if found.is_candidate() => {
-            let WithoutJitter { here, found_kms, scale_kms } = found.without_jitter.as_ref()?;
-            let velocities = found.known.beside(&here.quadratic);
-            let peak = Compared::Peak(1.0 / found.blind.best().porb_over_prot, &found.frequencies);
-            night_offsets(&velocities, &nights, (*found_kms, *scale_kms), peak, settings)
-        }
-        // its significance is that of the star without it
-        Tried::Known(planet) if planet.is_candidate() => {
-            let alone = found.alone.as_ref()?;
-            let WithoutJitter { here, found_kms, scale_kms } = alone.without_jitter.as_ref()?;
-            let velocities = found.known.beside_others(planet, &here.quadratic);
-            let unit = planet.ephemeris.unit_velocities(&velocities.cycles);
-            night_offsets(&velocities, &nights, (*found_kms, *scale_kms), Compared::Known(&unit), settings)
-        }
-        _ => None,
+impl Detection {
+    /// What RV offsets of nights make of the highest peak of the blind search, if it is a candidate beside a fitted
+    /// jitter.
+    pub fn peak_beside_nights(&self, imager: &Imager, settings: SearchSettings) -> Option<NightOffsets> {
+        let star = self.without_jitter.as_ref().filter(|_| self.is_candidate())?;
+        let velocities = self.known.beside(&star.here.quadratic);
+        let peak = Compared::Peak(1.0 / self.blind.best().porb_over_prot, &self.frequencies);
+        night_offsets(&velocities, &imager.nights_of_sets(), (star.found_kms, star.scale_kms), peak, settings)
+    }
+
+    /// The same of a known planet that would be one: as its significance, by the star without it.
+    pub fn known_beside_nights(
+        &self,
+        planet: &KnownPlanet,
+        imager: &Imager,
+        settings: SearchSettings,
+    ) -> Option<NightOffsets> {
+        let alone = self.alone.as_ref().filter(|_| planet.is_candidate())?;
+        let star = alone.without_jitter.as_ref()?;
+        let velocities = self.known.beside_others(planet, &star.here.quadratic);
+        let known = Compared::Known(&planet.ephemeris.unit_velocities(&velocities.cycles));
+        night_offsets(&velocities, &imager.nights_of_sets(), (star.found_kms, star.scale_kms), known, settings)
     }
 }
 
@@ -275,7 +269,7 @@ mod tests {
             night(None),
         ];
         let targets = vec![at(0.205), at(0.2), at(0.192)];
-        let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets, nights, night_offsets: None };
+        let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets, nights };
         assert_eq!(steady.held_out(), Some(HeldOut { delta_ln_p: 4.0, sigma_delta_ln_p: 0.0, nights: 4 }));
         assert_eq!(steady.target_matters(), None);
         let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();

@@ -149,6 +149,9 @@ pub struct KnownPlanetRecord {
     /// Its shape, where the config gives one; a circle otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
+    /// What RV offsets of nights make of it, where it would be a candidate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub night_offsets: Option<NightOffsets>,
 }
 
 impl KnownPlanetRecord {
@@ -324,7 +327,7 @@ pub struct RobustnessRecord {
     /// The sum over them of what the planet adds to their prediction; null for less than two nights.
     #[serde(default)]
     pub held_out_nights: Option<HeldOut>,
-    /// What RV offsets of nights make of a candidate, or of a known planet that would be one.
+    /// What RV offsets of nights make of the highest peak, if it is a candidate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_offsets: Option<NightOffsets>,
 }
@@ -397,15 +400,16 @@ impl PeriodogramFile {
         if let Some(highest) = all.first_mut() {
             highest.orbit = orbit(found.highest());
         }
-        let known_planet = |(planet, verdict): (&KnownPlanet, &Verdict)| KnownPlanetRecord {
+        let known_planet = |(k, planet): (usize, &KnownPlanet)| KnownPlanetRecord {
             planet: planet.ephemeris.planet + 1,
-            verdict: verdict.clone(),
+            verdict: search.known[k].clone(),
             orbit: orbit(&planet.peak()),
             shape: planet.ephemeris.shape,
+            night_offsets: search.known_night_offsets[k],
         };
         PeriodogramFile {
             verdict: search.verdict.clone(),
-            known_planets: found.known.planets.iter().zip(&search.known).map(known_planet).collect(),
+            known_planets: found.known.planets.iter().enumerate().map(known_planet).collect(),
             blind: search.blind.clone(),
             truth: scene.truth,
             derived_truth: best.quantities.injected(scene.truth, &quantities),
@@ -442,7 +446,10 @@ impl PeriodogramFile {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),
             },
-            robustness: search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default(),
+            robustness: RobustnessRecord {
+                night_offsets: search.night_offsets,
+                ..search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default()
+            },
             evidence: search.evidence.clone(),
             warnings: search.remarks.iter().map(|remark| remark.text.clone()).collect(),
             provenance: Provenance { measured: search.measured(), ..scene.provenance() },
@@ -542,7 +549,7 @@ impl RobustnessRecord {
         };
         RobustnessRecord {
             held_out_nights: found.held_out(),
-            night_offsets: found.night_offsets,
+            night_offsets: None,
             targets: found.targets.iter().map(target).collect(),
             without_night: found.nights.iter().map(night).collect(),
         }

@@ -6,11 +6,11 @@ use super::summary::SearchSummary;
 use crate::data::io::provenance::Measured;
 use crate::data::scene::Scene;
 use crate::inference::detection::{
-    Detection, DetectionSettings, Evidence, KnownPlanet, Robustness, Stage, Tried, beside_night_offsets,
-    of_night_offsets, robustness,
+    Detection, DetectionSettings, Evidence, KnownPlanet, Robustness, Stage, Tried, of_night_offsets, robustness,
 };
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Parameter, for_blind_search};
+use crate::planets::periodogram::nights::NightOffsets;
 use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
 use crate::surface::{Constants, Explained, Linearised};
 use std::borrow::Cow;
@@ -23,6 +23,10 @@ pub struct BlindSearch<'a> {
     pub(super) detection: Cow<'a, Detection>,
     /// Whether the best orbit depends on a choice, where that was tried.
     pub(super) robustness: Option<Robustness>,
+    /// What RV offsets of nights make of the highest peak.
+    pub(super) night_offsets: Option<NightOffsets>,
+    /// The same of each planet of known ephemeris, in the order of the config.
+    pub(super) known_night_offsets: Vec<Option<NightOffsets>>,
     /// The profiles as the spots of a star without a planet explain them.
     pub(super) planet_free: Explained,
     /// The same beside the best orbit.
@@ -89,22 +93,31 @@ impl<'a> BlindSearch<'a> {
         };
         let first = detection.known.first();
         let robustness = is_tried.then(|| try_out(first.map_or(Tried::Peak(&detection.best), Tried::Known)));
+        let compares = options.robustness != RobustnessOf::None;
+        let night_offsets = compares.then(|| detection.peak_beside_nights(imager, settings.search)).flatten();
+        let of_known = |planet| compares.then(|| detection.known_beside_nights(planet, imager, settings.search));
+        let known_night_offsets: Vec<_> = detection.known.planets.iter().map(|of| of_known(of).flatten()).collect();
         let surface = settings.surface.model();
         let explained = |here: &Linearised| surface.explained(imager, &scene.observations, here);
         let (planet_free, at_best) = (explained(&detection.planet_free), explained(detection.last()));
         let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
-        let evidence = Evidence { imager, settings: &settings, robustness: robustness.as_ref(), misfit: &misfit };
+        let evidence = Evidence {
+            imager,
+            settings: &settings,
+            robustness: robustness.as_ref(),
+            night_offsets: first.map_or(night_offsets, |_| known_night_offsets[0]),
+            misfit: &misfit,
+        };
         let mut remarks = detection.remarks(&evidence);
         let of_the_star = detection.of_the_star(&evidence);
         let why_not = scene.measured.problem().or_else(|| detection.not_judged());
         let judged = |verdict: Verdict| why_not.as_ref().map_or(verdict, Verdict::not_judged);
         let mut known = Vec::new();
-        for planet in &detection.known.planets {
+        for (planet, offsets) in detection.known.planets.iter().zip(&known_night_offsets) {
             let mut against = of_the_star.clone();
-            // the first one is tried out
-            if options.robustness != RobustnessOf::None && first.is_none_or(|first| !std::ptr::eq(first, planet)) {
-                let beside = beside_night_offsets(imager, settings.search, &detection, Tried::Known(planet));
-                let offsets = beside.and_then(of_night_offsets);
+            let offsets = offsets.and_then(of_night_offsets);
+            // of the first one it is said with the rest
+            if planet.ephemeris.planet > 0 {
                 let number = planet.ephemeris.planet + 1;
                 let said = |remark: &Remark| Remark::note(format!("Known planet {number}: {}", remark.text));
                 remarks.extend(offsets.as_ref().map(said));
@@ -116,9 +129,9 @@ impl<'a> BlindSearch<'a> {
         let mut blind = None;
         if first.is_some() {
             // what is said of the highest peak beside it
-            let is_tried = detection.is_candidate() && options.robustness != RobustnessOf::None;
+            let is_tried = detection.is_candidate() && compares;
             let tried = is_tried.then(|| try_out(Tried::Peak(detection.highest())));
-            let of_the_peak = detection.of_the_peak(tried.as_ref());
+            let of_the_peak = detection.of_the_peak(tried.as_ref(), night_offsets);
             blind = Some(detection.verdict(&[of_the_star, of_the_peak.clone()].concat()));
             verdict = known[0].clone().with(&remarks);
             known[0] = judged(verdict.clone());
@@ -137,6 +150,8 @@ impl<'a> BlindSearch<'a> {
             settings,
             detection,
             robustness,
+            night_offsets,
+            known_night_offsets,
             planet_free,
             at_best,
             constants,
