@@ -113,6 +113,12 @@ impl Manifest {
     pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(RunSummary, Vec<Settled>), ChainError> {
         let (kinds, goals) = kinds_and_goals(settings);
         let mut summary = summarise(chain, &kinds, &goals)?;
+        for f in &settings.free {
+            let of = summary.parameters.get_mut(f.parameter.name());
+            if let (Some(factor), Some(one)) = (self.origin.reference.widening(f.parameter), of) {
+                one.widen(factor, f.prior.bounds());
+            }
+        }
         let quantities = self.orbit_quantities(settings).of_draws(&settings.free, &settings.values);
         let settled = summary.derive(chain, quantities);
         let mass = summary.derived.get(OrbitQuantity::MinimumMass.name());

@@ -6,13 +6,15 @@ use crate::data::io::saved::{Saved, as_many, square};
 use crate::data::scene::Scene;
 use crate::inference::search::{Attempt, Found};
 use crate::model::{
-    Elements, Estimate, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths, quoted_definition,
+    Elements, Estimate, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths,
+    quoted_definition,
 };
 use crate::numerics::text::listed;
 use crate::runs::blind_search::{BlindSearch, SearchSummary};
 use crate::runs::origin::{OptimumRecord, provenance};
 use crate::sampling::optimise::Optimum;
 use crate::surface::record::SurfaceRecord;
+use nalgebra::DVector;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -32,11 +34,14 @@ pub struct OptimumFile {
     /// Numbers beside the log-probability there, by name.
     #[serde(flatten, deserialize_with = "numbers_alone")]
     pub numbers: BTreeMap<String, f64>,
+    /// What the standard deviations of some are multiplied by, where those of the curvature are too small.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub widened: BTreeMap<String, f64>,
     /// Whether the curvature is positive definite: without that the standard deviations mean nothing.
     pub well_defined: bool,
     /// Whether the search met its tolerance.
     pub converged: bool,
-    /// Covariance of the parameters from the curvature.
+    /// Covariance of the parameters from the curvature, widened as the standard deviations.
     pub covariance: Vec<Vec<f64>>,
     /// Minus the Hessian of the log-probability in sampling coordinates, where K and phi (if both are free) are K cos
     /// and K sin of the orbital phase at mid-time.
@@ -109,7 +114,14 @@ fn numbers_alone<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<
 impl OptimumFile {
     /// The file for what a search in `scene` found.
     pub fn new(scene: &Scene, found: &Found) -> Self {
-        let optimum = &found.optimum;
+        let reference = found.posterior.record();
+        let free = scene.space.free();
+        let factor = |f: &FreeParameter| Some((f.parameter.name().to_owned(), reference.widening(f.parameter)?));
+        let by = free.iter().map(|f| reference.widening(f.parameter).unwrap_or(1.0));
+        let by = DVector::from_iterator(free.len(), by);
+        let mut optimum = found.optimum.clone();
+        optimum.written_covariance.component_mul_assign(&(&by * by.transpose()));
+        let optimum = &optimum;
         let (derived, derived_truth) = derived(scene, optimum);
         let prot = scene.imager.star.rotation_period_d;
         let porb_over_prot = scene.space.values_at(&optimum.theta)[Parameter::PorbOverProt];
@@ -118,6 +130,7 @@ impl OptimumFile {
         OptimumFile {
             names: scene.space.names().to_vec(),
             optimum: OptimumRecord::of(scene.space.names(), optimum),
+            widened: free.iter().filter_map(factor).collect(),
             numbers: names.iter().map(|name| (*name).to_owned()).zip(optimum.evaluation.numbers.clone()).collect(),
             well_defined: optimum.well_defined,
             converged: optimum.converged,
@@ -128,7 +141,7 @@ impl OptimumFile {
             derived,
             truth: scene.named_truth(),
             derived_truth,
-            reference: found.posterior.record(),
+            reference,
             starts: found.attempts.iter().map(StartRecord::of).collect(),
             profiles: scene.observations.profiles.len(),
             time_span_d: scene.observations.time_span_d(),

@@ -77,8 +77,13 @@ pub struct FieldRecord {
     pub data: usize,
 }
 
+/// Above this vsini (km/s) evolving maps are too sure of some parameters, by a factor.
+const FAST_KMS: f64 = 45.0;
+const TOO_SURE: [Parameter; 3] = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination];
+const WIDENING: f64 = 1.6;
+
 impl FieldRecord {
-    /// Parameters of the field that lie on a bound of its search, and free ones whose errors are too small.
+    /// Parameters of the field that lie on a bound of its search, and free ones whose uncertainties are widened.
     fn warnings(&self, free: &[String]) -> Vec<String> {
         /// Nearer than this part a bound is reached.
         const REACHED: f64 = 0.01;
@@ -91,20 +96,23 @@ impl FieldRecord {
                 _ => format!("{} lies on the bound of its search, {bound}", p.name()),
             })
         };
-        Parameter::FIELD.iter().filter_map(on_bound).chain(self.too_sure(free)).collect()
+        Parameter::FIELD.iter().filter_map(on_bound).chain(self.widened(free)).collect()
     }
 
-    /// Which errors are known to be too small (`results/calibration-stellar.md`).
-    fn too_sure(&self, free: &[String]) -> Option<String> {
-        /// Above this vsini (km/s) they are.
-        const FAST_KMS: f64 = 45.0;
+    /// By how much the uncertainty of a parameter has to be multiplied (`results/calibration-stellar.md`).
+    fn widening(&self, p: Parameter) -> Option<f64> {
         let is_fast = *self.parameters.get(Parameter::Vsini.name())? > FAST_KMS;
-        let of = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination].map(Parameter::name);
-        let of: Vec<&str> = of.into_iter().filter(|name| free.iter().any(|free| free == name)).collect();
-        (is_fast && !of.is_empty()).then(|| {
+        (is_fast && TOO_SURE.contains(&p)).then_some(WIDENING)
+    }
+
+    /// Which uncertainties are multiplied.
+    fn widened(&self, free: &[String]) -> Option<String> {
+        let of = TOO_SURE.into_iter().filter(|p| free.iter().any(|free| free == p.name()));
+        let of: Vec<&str> = of.filter(|p| self.widening(*p).is_some()).map(Parameter::name).collect();
+        (!of.is_empty()).then(|| {
             format!(
-                "vsini is above {FAST_KMS:.0} km/s: take {} with twice the errors, which on simulated stars with spots \
-                like discs were too small by factors of 1.4 to 1.7",
+                "vsini is above {FAST_KMS:.0} km/s: uncertainties of {} are multiplied by {WIDENING}, by which they \
+                were too small on simulated stars with spots like discs; draws of a chain are as sampled",
                 of.join(", ")
             )
         })
@@ -174,6 +182,14 @@ impl SurfaceRecord {
         }
     }
 
+    /// By how much the uncertainty of a parameter has to be multiplied, where it comes out too small.
+    pub fn widening(&self, p: Parameter) -> Option<f64> {
+        match &self.0 {
+            Reference::Image(_) => None,
+            Reference::Field(record) => record.widening(p),
+        }
+    }
+
     /// All parameters; those missing in the record are taken from `others`, but for a lifetime: without one spots are
     /// static.
     pub fn values(&self, others: &ParameterValues) -> ParameterValues {
@@ -222,15 +238,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fast_stars_are_too_sure_of_their_shear() {
+    fn uncertainties_of_fast_stars_are_widened() {
         let of = |vsini_kms: f64, free: &[&str]| {
             let parameters = BTreeMap::from([("vsini_kms".to_owned(), vsini_kms)]);
             let (spot_break_degree, velocity_jitter_kms, ln_evidence, data) = (7.0, 0.0, 0.0, 1);
             let record = FieldRecord { parameters, spot_break_degree, velocity_jitter_kms, ln_evidence, data };
+            let record = SurfaceRecord::from(record);
+            assert_eq!(record.widening(Parameter::DOmega).is_some(), vsini_kms > FAST_KMS);
+            assert_eq!(record.widening(Parameter::K), None);
             record.warnings(&free.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
         };
         let [warning] = &of(60.0, &["k_kms", "domega_rad_d", "inclination_deg"])[..] else { panic!("one warning") };
-        assert!(warning.contains("take domega_rad_d, inclination_deg with twice the errors"), "{warning}");
+        assert!(warning.contains("uncertainties of domega_rad_d, inclination_deg are multiplied"), "{warning}");
         assert!(of(40.0, &["domega_rad_d"]).is_empty());
         assert!(of(60.0, &["k_kms", "vsini_kms"]).is_empty());
     }

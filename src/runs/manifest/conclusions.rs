@@ -239,6 +239,7 @@ mod tests {
             ess: None,
             tau: None,
             unconstrained: false,
+            widened: None,
             upper95: None,
         }
     }

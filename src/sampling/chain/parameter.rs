@@ -48,9 +48,26 @@ pub struct ParameterSummary {
     /// Whether the data hardly say more of it than its prior, so that its median means nothing.
     #[serde(default, skip_serializing_if = "is_false")]
     pub unconstrained: bool,
+    /// What its standard deviation and intervals were multiplied by, where those of the draws are too small.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub widened: Option<f64>,
     /// Upper limit (95 %), for an amplitude that touches zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upper95: Option<f64>,
+}
+
+impl ParameterSummary {
+    /// Multiplies its standard deviation and, about the median, its intervals, which stay within the bounds of its
+    /// prior: the draws are moved away from their middle (Shaby 2014, J. Comput. Graph. Stat. 23, 588, open-faced
+    /// sandwich adjustment).
+    pub fn widen(&mut self, factor: f64, (low, high): (f64, f64)) {
+        let median = self.median;
+        for interval in [&mut self.ci68, &mut self.ci95, &mut self.hdi68, &mut self.hdi95] {
+            *interval = interval.map(|end| (median + factor * (end - median)).clamp(low.min(end), high.max(end)));
+        }
+        self.sd *= factor;
+        self.widened = Some(factor);
+    }
 }
 
 /// Statistics of the pooled draws of one parameter.
@@ -90,6 +107,27 @@ pub(super) fn parameter_summary(
         ess: diagnostic.ess,
         tau: diagnostic.tau,
         unconstrained: false,
+        widened: None,
         upper95: touches_zero.then(|| quantile(&values, 0.95)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_widened_about_the_median_within_the_prior() {
+        let values = (0..=1000).map(|k| 80.0 + 0.01 * f64::from(k)).collect();
+        let diagnostic = Diagnostic { rhat: None, ess: None, tau: None };
+        let mut one = parameter_summary(values, ParameterKind::Linear, &diagnostic);
+        let before = one.clone();
+        one.widen(1.5, (3.0, 89.0));
+        assert_eq!((one.median, one.mean, one.widened), (before.median, before.mean, Some(1.5)));
+        let [low, high] = before.ci68;
+        let expected = [85.0 - 1.5 * (85.0 - low), (85.0 + 1.5 * (high - 85.0)).min(89.0)];
+        assert!(one.ci68.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{:?} {expected:?}", one.ci68);
+        assert!((one.sd / before.sd - 1.5).abs() < 1e-12);
+        assert_eq!(one.ci95[1], before.ci95[1].max(89.0));
     }
 }
