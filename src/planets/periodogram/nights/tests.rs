@@ -1,3 +1,5 @@
+//! Offsets of nights against the covariance of velocities, and how often chance makes a planet beside them.
+
 use super::super::FrequencySettings;
 use super::super::sample;
 use super::*;
