@@ -75,7 +75,9 @@ impl Manifest {
         };
         let line = |rival: &OptimumRecord| format!("Secondary maximum, also used as a start: {}", place(rival));
         let measured = self.origin.measured.lines().into_iter().map(|(label, text)| format!("{label}: {text}"));
-        self.origin.rivals.iter().map(line).chain(self.origin.reference.warnings(&self.names)).chain(measured).collect()
+        let warnings = self.origin.reference.warnings(&self.names).into_iter();
+        let warnings = warnings.chain(self.origin.measured.held_regions(&self.names));
+        self.origin.rivals.iter().map(line).chain(warnings).chain(measured).collect()
     }
 
     /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an

@@ -157,6 +157,13 @@ impl OptimumFile {
         write_json(&folder.join(FILE), self)
     }
 
+    /// What has to be known beside the best values.
+    pub fn warnings(&self) -> Vec<String> {
+        let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
+        let held = self.provenance.measured.held_regions(&self.names);
+        remarks.chain(self.reference.warnings(&self.names)).chain(held).collect()
+    }
+
     /// A table of the parameters and a verdict.
     pub fn table(&self) -> String {
         let width = self.names.iter().map(String::len).max().unwrap_or(0).max("parameter".len());
@@ -182,8 +189,7 @@ impl OptimumFile {
             (false, _) => "No well-defined maximum: at a prior boundary, or a degenerate direction",
         };
         let _ = writeln!(table, "{maximum}; ln P = {:.3}{}", self.optimum.log_prob, listed(&self.numbers));
-        let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
-        for note in remarks.chain(self.reference.warnings(&self.names)) {
+        for note in self.warnings() {
             let _ = writeln!(table, "note: {note}");
         }
         table

@@ -1,5 +1,6 @@
 //! What every result says of where it came from.
 
+use crate::model::Parameter;
 use crate::numerics::json::Part;
 use crate::surface::calibration::events::Events;
 use crate::surface::calibration::jitter::MeasuredJitter;
@@ -158,6 +159,21 @@ impl Measured {
         let of_events = self.events.as_ref().and_then(Events::too_many);
         let of_contrasts = || self.sets.iter().find_map(MeasuredSet::problem);
         of_events.or_else(|| self.star.as_ref().and_then(MeasuredStar::problem)).or_else(of_contrasts)
+    }
+
+    /// That active regions may make up for an inclination that is wrong, where that is free
+    /// (`results/calibration-stellar.md`).
+    pub fn held_regions(&self, free: &[String]) -> Option<String> {
+        let is_region = |name: &str| Parameter::REGIONS.iter().any(|p| p.name() == name);
+        let is_free = |name: &str| free.iter().any(|free| free == name);
+        let numbers = self.star.iter().flat_map(|star| &star.numbers);
+        let is_held = numbers.into_iter().any(|number| is_region(&number.name) && !is_free(&number.name));
+        (is_held && is_free(Parameter::Inclination.name())).then(|| {
+            "active regions are fitted at star.inclination_deg and then held: they may make up for a wrong one, and \
+            inclination_deg then stays there; compare without regions (area, area_limb \
+            and dimming_limb of star.regions 0)"
+                .to_owned()
+        })
     }
 
     /// That the model does not fit as well as the continuum promises, where the errors say so.

@@ -201,11 +201,10 @@ fn best(file: &OptimumFile) -> Chapter {
     let search = file.blind_search.as_ref();
     let mut verdicts: Vec<(Tone, String)> = search.map(|search| verdicts::of(&search.verdict)).into_iter().collect();
     verdicts.push((tone(file.well_defined && file.converged), sentence.into()));
-    let remarks = search.into_iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
     Chapter {
         heading: "Optimum".into(),
         verdicts,
-        warnings: remarks.chain(file.reference.warnings(&file.names)).collect(),
+        warnings: file.warnings(),
         notes,
         tables: vec![(
             "The best parameters, with uncertainties from the curvature.".into(),

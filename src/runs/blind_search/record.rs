@@ -446,10 +446,7 @@ impl PeriodogramFile {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),
             },
-            robustness: RobustnessRecord {
-                night_offsets: search.night_offsets,
-                ..search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default()
-            },
+            robustness: RobustnessRecord::of(search.robustness.as_ref(), search.night_offsets),
             evidence: search.evidence.clone(),
             warnings: search.remarks.iter().map(|remark| remark.text.clone()).collect(),
             provenance: Provenance { measured: search.measured(), ..scene.provenance() },
@@ -534,7 +531,8 @@ impl FalseAlarmRecord {
 }
 
 impl RobustnessRecord {
-    fn of(found: &Robustness) -> Self {
+    fn of(found: Option<&Robustness>, night_offsets: Option<NightOffsets>) -> Self {
+        let Some(found) = found else { return RobustnessRecord { night_offsets, ..Default::default() } };
         let target = |at: &AtTarget| TargetRecord {
             chi2_target: at.chi2_target,
             reached: at.on_target,
@@ -549,7 +547,7 @@ impl RobustnessRecord {
         };
         RobustnessRecord {
             held_out_nights: found.held_out(),
-            night_offsets: None,
+            night_offsets,
             targets: found.targets.iter().map(target).collect(),
             without_night: found.nights.iter().map(night).collect(),
         }
