@@ -163,10 +163,11 @@ impl Scene {
         if !(is_open || rotation) || self.measured.field_start.is_some() {
             return self;
         }
-        let (nuisances, slope) = (nuisances(&self.settings.free), self.settings.drift.is_none());
+        let (free, slope) = (&self.settings.free[..], self.settings.drift.is_none());
+        let nuisances = nuisances(free);
         let events = by_hand.as_deref();
         let contrasts = &contrasts[..];
-        let asked = Asked { fitted: &fitted, events, slope, contrasts, nuisances: &nuisances, rotation };
+        let asked = Asked { fitted: &fitted, events, slope, contrasts, free, nuisances: &nuisances, rotation };
         match calibration::found(&self.imager, values, &known, asked, report) {
             Ok(FoundStar { star, events, drift_kms_d, contrasts: of_sets, other_rotation, field, problem }) => {
                 let profiles = problem.map(|error| format!("star not fitted: {error}")).into_iter().collect();

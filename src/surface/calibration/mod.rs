@@ -11,7 +11,7 @@ pub mod offsets;
 pub mod star;
 pub mod target;
 
-use crate::model::{Parameter, ParameterValues};
+use crate::model::{FreeParameter, Parameter, ParameterValues};
 use crate::surface::evolving_map::contrast::{FittedContrast, fit_contrast};
 use crate::surface::evolving_map::star::{coarsely, slopes};
 use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
@@ -19,7 +19,7 @@ use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
 use crate::surface::{FieldStart, Known, OtherRotation};
 use events::{ByHand, Events};
-use star::MeasuredStar;
+use star::{MeasuredStar, Open, with_geometry};
 
 /// What is to be asked of the profiles before maps and searches.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,9 @@ pub struct Asked<'a> {
     pub slope: bool,
     /// Data sets with a contrast of spots for each.
     pub contrasts: &'a [usize],
-    /// Parameters that are integrated out.
+    /// Parameters that are free.
+    pub free: &'a [FreeParameter],
+    /// Those that are integrated out.
     pub nuisances: &'a [Nuisance],
     /// Whether the rotation period can be another one.
     pub rotation: bool,
@@ -102,7 +104,11 @@ pub fn found(
         plain = coarsely(&without, values, *known)?;
     }
     report("fitting active regions");
-    let (star, mut near) = match MeasuredStar::of(&without, &plain, known, asked.fitted) {
+    let open = Open { fitted: asked.fitted, free: asked.free };
+    if let Some(values) = with_geometry(&without, &plain, known, open)? {
+        plain = coarsely(&without, values, *known)?;
+    }
+    let (star, mut near) = match MeasuredStar::of(&without, &plain, known, open) {
         Ok(found) => found,
         // the rest holds without it
         Err(error) => {

@@ -5,7 +5,7 @@
 //! equivalent width, and inhibited convection shifts it by 0.3 km/s (Dumusque, Boisse & Santos 2014, ApJ 796, 132,
 //! sections 2 and 3). They are wide: regions of other stars are stronger.
 
-use crate::model::{Parameter, ParameterValues};
+use crate::model::{FreeParameter, Parameter, ParameterValues};
 use crate::numerics::units::FWHM_PER_SIGMA;
 use crate::star::{Seen, StarSettings};
 use crate::surface::Known;
@@ -33,7 +33,8 @@ const OF_LIMB_DARKENING: f64 = 0.15;
 /// The prior of a number of the star that is `value` by the config.
 fn prior(parameter: Parameter, value: f64) -> StarPrior {
     let (low, high) = parameter.widest();
-    let of = |mean: f64, sd: f64, start: f64| StarPrior { parameter, mean, sd, start, bounds: (low, high) };
+    let of =
+        |mean: f64, sd: f64, start: f64| StarPrior { parameter, mean, sd, start, bounds: (low, high), is_free: false };
     match parameter {
         Parameter::LineSigma => StarPrior { bounds: (0.2 * value, 5.0 * value), ..of(value, OF_LINE * value, value) },
         Parameter::EquivalentWidth => {
@@ -49,6 +50,51 @@ fn prior(parameter: Parameter, value: f64) -> StarPrior {
             of_regions.map_or(of(value, 1.0, value), |&(_, mean, sd, start)| of(mean, sd, start))
         }
     }
+}
+
+/// What is asked of the star: numbers that are fitted, and parameters that are free whatever is fitted. Active regions
+/// found at an inclination that is wrong would make up for it, and a search for the inclination would stay there.
+#[derive(Clone, Copy, Debug)]
+pub struct Open<'a> {
+    /// Numbers that are fitted.
+    pub fitted: &'a [Parameter],
+    /// Parameters that are free.
+    pub free: &'a [FreeParameter],
+}
+
+impl Open<'_> {
+    /// Priors of parameters that are free, as in chains but for their shape.
+    fn of_free(&self, values: &ParameterValues) -> Vec<StarPrior> {
+        let is_open = |of: &&FreeParameter| GEOMETRY.contains(&of.parameter) && !self.fitted.contains(&of.parameter);
+        let of = |&FreeParameter { parameter, prior }: &FreeParameter| {
+            let (mean, sd) = prior.mean_and_sd();
+            StarPrior { parameter, mean, sd, start: values[parameter], bounds: prior.bounds(), is_free: true }
+        };
+        self.free.iter().filter(is_open).map(of).collect()
+    }
+}
+
+/// Parameters that active regions may make up for.
+const GEOMETRY: [Parameter; 4] = [Parameter::Inclination, Parameter::Vsini, Parameter::OmegaEq, Parameter::DOmega];
+
+/// `values` where those parameters that are free are the most probable ones, active regions apart.
+///
+/// # Errors
+/// [`NoFit`].
+pub fn with_geometry(
+    imager: &Imager,
+    plain: &Fitted,
+    known: &Known,
+    open: Open,
+) -> Result<Option<ParameterValues>, NoFit> {
+    let mut values = plain.marginal.values;
+    let priors = open.of_free(&values);
+    if priors.is_empty() {
+        return Ok(None);
+    }
+    let found = fit_star(imager, plain, known, &priors, f64::NEG_INFINITY)?;
+    priors.iter().for_each(|prior| values.set(prior.parameter, found.values[prior.parameter]));
+    Ok(Some(values))
 }
 
 /// Whether a number of active regions lies on a bound; no surface of theirs is none of it.
@@ -109,19 +155,20 @@ impl MeasuredStar {
     ///
     /// # Errors
     /// [`NoFit`].
-    pub fn of(imager: &Imager, plain: &Fitted, known: &Known, fitted: &[Parameter]) -> Result<(Self, Assumed), NoFit> {
-        let together = MeasuredStar::by(imager, plain, known, fitted)?;
+    pub fn of(imager: &Imager, plain: &Fitted, known: &Known, open: Open) -> Result<(Self, Assumed), NoFit> {
+        let together = MeasuredStar::by(imager, plain, known, open)?;
+        let fitted = open.fitted;
         let is_of_regions = |parameter: &Parameter| Parameter::REGIONS.contains(parameter);
         let regions: Vec<Parameter> = fitted.iter().copied().filter(is_of_regions).collect();
         if !together.0.numbers.is_empty() || regions.is_empty() || regions.len() == fitted.len() {
             return Ok(together);
         }
-        let alone = MeasuredStar::by(imager, plain, known, &regions)?;
+        let alone = MeasuredStar::by(imager, plain, known, Open { fitted: &regions, ..open })?;
         Ok(if alone.0.numbers.is_empty() { together } else { alone })
     }
 
     /// The same by all that is `fitted` or nothing.
-    fn by(imager: &Imager, plain: &Fitted, known: &Known, fitted: &[Parameter]) -> Result<(Self, Assumed), NoFit> {
+    fn by(imager: &Imager, plain: &Fitted, known: &Known, open: Open) -> Result<(Self, Assumed), NoFit> {
         let values = plain.marginal.values;
         let star = imager.star.with(&values.surface);
         let value = |parameter: Parameter| match parameter {
@@ -130,10 +177,12 @@ impl MeasuredStar {
             Parameter::LimbDarkening => star.limb_darkening.coefficients().0,
             _ => values.get(parameter).unwrap_or(0.0),
         };
-        let priors: Vec<StarPrior> = fitted.iter().map(|parameter| prior(*parameter, value(*parameter))).collect();
+        let fitted = open.fitted.iter().map(|parameter| prior(*parameter, value(*parameter)));
+        let priors: Vec<StarPrior> = open.of_free(&values).into_iter().chain(fitted).collect();
         let FittedStar { values, sd, mean_profile, ln_evidence, ln_prior, assumed } =
             fit_star(imager, plain, known, &priors, NEEDED)?;
-        let told: f64 = sd.iter().zip(&priors).map(|(sd, prior)| (sd / prior.sd).min(1.0).ln()).sum();
+        let counted = sd.iter().zip(&priors).filter(|(_, prior)| !prior.is_free);
+        let told: f64 = counted.map(|(sd, prior)| (sd / prior.sd).min(1.0).ln()).sum();
         let gain = ln_evidence - plain.ln_evidence;
         if gain + ln_prior + told < NEEDED {
             return Ok((MeasuredStar { gain, ..MeasuredStar::default() }, plain.marginal.assumed));

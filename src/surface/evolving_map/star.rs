@@ -66,6 +66,8 @@ pub struct StarPrior {
     pub start: f64,
     /// Bounds.
     pub bounds: (f64, f64),
+    /// Whether it is free whatever is fitted: chains and searches find it.
+    pub is_free: bool,
 }
 
 /// The most probable star.
@@ -216,6 +218,10 @@ impl StarPrior {
     fn is_of_line(&self) -> bool {
         !Parameter::REGIONS.contains(&self.parameter)
     }
+
+    fn is_fitted_line(&self) -> bool {
+        self.is_of_line() && !self.is_free
+    }
 }
 
 impl<'a> Climb<'a> {
@@ -228,7 +234,7 @@ impl<'a> Climb<'a> {
         let size = (MEAN_PROFILES.0.ln(), MEAN_PROFILES.1.ln());
         let limits = limits_of_field(known).into_iter().chain([size]).chain(priors.iter().map(ends)).collect();
         // who trusts the line trusts the mean profile
-        let free = known.free(assumed).into_iter().chain([priors.iter().any(StarPrior::is_of_line)]).collect();
+        let free = known.free(assumed).into_iter().chain([priors.iter().any(StarPrior::is_fitted_line)]).collect();
         Climb { imager, basis: Arc::new(Basis::coarse(&imager.grid, DEGREE)), known, priors, free, limits }
     }
 
