@@ -161,17 +161,15 @@ impl Measured {
         of_events.or_else(|| self.star.as_ref().and_then(MeasuredStar::problem)).or_else(of_contrasts)
     }
 
-    /// That active regions may make up for an inclination that is wrong, where that is free
-    /// (`results/calibration-stellar.md`).
+    /// That the uncertainty of a free inclination lacks that of active regions (`results/calibration-stellar.md`).
     pub fn held_regions(&self, free: &[String]) -> Option<String> {
         let is_region = |name: &str| Parameter::REGIONS.iter().any(|p| p.name() == name);
         let is_free = |name: &str| free.iter().any(|free| free == name);
         let numbers = self.star.iter().flat_map(|star| &star.numbers);
         let is_held = numbers.into_iter().any(|number| is_region(&number.name) && !is_free(&number.name));
         (is_held && is_free(Parameter::Inclination.name())).then(|| {
-            "active regions are fitted at star.inclination_deg and then held: they may make up for a wrong one, and \
-            inclination_deg then stays there; compare without regions (area, area_limb \
-            and dimming_limb of star.regions 0)"
+            "active regions are fitted together with inclination_deg and then held: its uncertainty does not include \
+            theirs; compare without regions (area, area_limb and dimming_limb of star.regions 0)"
                 .to_owned()
         })
     }

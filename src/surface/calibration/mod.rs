@@ -105,8 +105,9 @@ pub fn found(
     }
     report("fitting active regions");
     let open = Open { fitted: asked.fitted, free: asked.free };
-    if let Some(values) = with_geometry(&without, &plain, known, open)? {
-        plain = coarsely(&without, values, *known)?;
+    // where that leads nowhere, the fit begins as the config has it
+    if let Ok(Some(better)) = with_geometry(&without, &plain, known, open) {
+        plain = better;
     }
     let (star, mut near) = match MeasuredStar::of(&without, &plain, known, open) {
         Ok(found) => found,

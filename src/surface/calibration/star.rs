@@ -9,7 +9,7 @@ use crate::model::{FreeParameter, Parameter, ParameterValues};
 use crate::numerics::units::FWHM_PER_SIGMA;
 use crate::star::{Seen, StarSettings};
 use crate::surface::Known;
-use crate::surface::evolving_map::star::{FittedStar, StarPrior, fit_star};
+use crate::surface::evolving_map::star::{FittedStar, StarPrior, coarsely, fit_star};
 use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
@@ -77,16 +77,12 @@ impl Open<'_> {
 /// Parameters that active regions may make up for.
 const GEOMETRY: [Parameter; 4] = [Parameter::Inclination, Parameter::Vsini, Parameter::OmegaEq, Parameter::DOmega];
 
-/// `values` where those parameters that are free are the most probable ones, active regions apart.
+/// The field where those parameters that are free are the most probable ones, active regions apart; `None` where none is
+/// free.
 ///
 /// # Errors
 /// [`NoFit`].
-pub fn with_geometry(
-    imager: &Imager,
-    plain: &Fitted,
-    known: &Known,
-    open: Open,
-) -> Result<Option<ParameterValues>, NoFit> {
+pub fn with_geometry(imager: &Imager, plain: &Fitted, known: &Known, open: Open) -> Result<Option<Fitted>, NoFit> {
     let mut values = plain.marginal.values;
     let priors = open.of_free(&values);
     if priors.is_empty() {
@@ -94,7 +90,7 @@ pub fn with_geometry(
     }
     let found = fit_star(imager, plain, known, &priors, f64::NEG_INFINITY)?;
     priors.iter().for_each(|prior| values.set(prior.parameter, found.values[prior.parameter]));
-    Ok(Some(values))
+    coarsely(imager, values, *known).map(Some)
 }
 
 /// Whether a number of active regions lies on a bound; no surface of theirs is none of it.
