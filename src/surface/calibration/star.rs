@@ -77,8 +77,8 @@ impl Open<'_> {
 /// Parameters that active regions may make up for.
 const GEOMETRY: [Parameter; 4] = [Parameter::Inclination, Parameter::Vsini, Parameter::OmegaEq, Parameter::DOmega];
 
-/// The field where those parameters that are free are the most probable ones, active regions apart; `None` where none is
-/// free.
+/// The field where those parameters that are free are the most probable ones, active regions apart; `None` where none
+/// is free.
 ///
 /// # Errors
 /// [`NoFit`].
