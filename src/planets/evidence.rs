@@ -99,22 +99,25 @@ const TOLD: usize = 5;
 pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
     let weights = jitters.ln_weights();
     let alone = ln_sum(&weights);
-    let levels: Vec<OfLevel> =
-        jitters.levels().iter().map(|level| OfLevel::new(&level.quadratic, priors)).collect::<Option<_>>()?;
-    let circles: Vec<f64> = weights.iter().zip(&levels).map(|(weight, of)| weight + of.one.ln_z).collect();
+    let quadratics: Vec<&VelocityQuadratic> = jitters.levels().iter().map(|level| &level.quadratic).collect();
+    let of_one = |quadratic: &&VelocityQuadratic| Periodogram::new(quadratic, priors[0]);
+    let ones: Vec<Periodogram> = quadratics.iter().map(of_one).collect::<Option<_>>()?;
+    let circles: Vec<f64> = weights.iter().zip(&ones).map(|(weight, one)| weight + one.ln_z).collect();
     let highest = circles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let counting: Vec<usize> = (0..ones.len()).filter(|k| circles[*k] > highest - NEGLIGIBLE).collect();
+    let levels: Vec<OfLevel> =
+        counting.iter().map(|k| OfLevel::new(quadratics[*k], &ones[*k], priors)).collect::<Option<_>>()?;
     let mix = |estimate: &dyn Fn(&OfLevel, &VelocityQuadratic) -> LnBayes| {
-        let counts = |k: &usize| circles[*k] > highest - NEGLIGIBLE;
-        let of = |k: usize| (weights[k] - alone, estimate(&levels[k], &jitters.levels()[k].quadratic));
-        mixed(&(0..levels.len()).filter(counts).map(of).collect::<Vec<_>>())
+        let of = |(k, level): (&usize, &OfLevel)| (weights[*k] - alone, estimate(level, quadratics[*k]));
+        mixed(&counting.iter().zip(&levels).map(of).collect::<Vec<_>>())
     };
-    let ellipse = mix(&|of, quadratic| repeated(seed, |rng| ellipse(quadratic, priors[0], &of.one, rng)));
+    let ellipse = mix(&|of, quadratic| repeated(seed, |rng| ellipse(quadratic, priors[0], of.one, rng)));
     let two_circles = mix(&|of, quadratic| {
         let pairs = of.pairs();
         repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, &pairs, rng))
     });
     let circle = LnBayes { ln_bayes: ln_sum(&circles) - alone, sd: None };
-    Some(Evidence { circle, ellipse, two_circles, inclusion: Periodogram::mixed(&weights, &levels).inclusion() })
+    Some(Evidence { circle, ellipse, two_circles, inclusion: Periodogram::mixed(&weights, &ones).inclusion() })
 }
 
 /// Sizes of the jitter beside which one planet is less likely than beside the best by that in ln are left out of what
@@ -131,27 +134,26 @@ fn mixed(parts: &[(f64, LnBayes)]) -> LnBayes {
 }
 
 /// What draws are made of, beside a jitter of one size.
-struct OfLevel {
+struct OfLevel<'a> {
     /// One planet.
-    one: Periodogram,
+    one: &'a Periodogram,
     /// The second where the first is at its best, and the other way round.
     beside: Option<Periodogram>,
     other: Periodogram,
     before: Option<Periodogram>,
 }
 
-impl OfLevel {
-    fn new(quadratic: &VelocityQuadratic, priors: [&PlanetPrior; 2]) -> Option<Self> {
-        let one = Periodogram::new(quadratic, priors[0])?;
+impl<'a> OfLevel<'a> {
+    fn new(quadratic: &VelocityQuadratic, one: &'a Periodogram, priors: [&PlanetPrior; 2]) -> Option<Self> {
         let rest = |best: &Periodogram, prior: &PlanetPrior| {
             without(quadratic, best.frequency(best.best())).and_then(|rest| Periodogram::new(&rest, prior))
         };
         let other = Periodogram::new(quadratic, priors[1])?;
-        Some(OfLevel { beside: rest(&one, priors[1]), before: rest(&other, priors[0]), one, other })
+        Some(OfLevel { beside: rest(one, priors[1]), before: rest(&other, priors[0]), one, other })
     }
 
     fn pairs(&self) -> Vec<[&Periodogram; 2]> {
-        let pairs = [(Some(&self.one), self.beside.as_ref()), (self.before.as_ref(), Some(&self.other))];
+        let pairs = [(Some(self.one), self.beside.as_ref()), (self.before.as_ref(), Some(&self.other))];
         pairs.into_iter().filter_map(|(a, b)| Some([a?, b?])).collect()
     }
 }
@@ -218,13 +220,13 @@ impl Periodogram {
     }
 
     /// The posterior of the frequency beside a jitter of all sizes: of `levels`, whose weights are logarithms.
-    fn mixed(weights: &[f64], levels: &[OfLevel]) -> Self {
+    fn mixed(weights: &[f64], levels: &[Periodogram]) -> Self {
         let alone = ln_sum(weights);
         let cell = |k: usize| {
-            let parts: Vec<f64> = weights.iter().zip(levels).map(|(weight, of)| weight + of.one.ln_cells[k]).collect();
+            let parts: Vec<f64> = weights.iter().zip(levels).map(|(weight, one)| weight + one.ln_cells[k]).collect();
             ln_sum(&parts) - alone
         };
-        let first = &levels[0].one;
+        let first = &levels[0];
         let ln_cells: Vec<f64> = (0..first.ln_cells.len()).map(cell).collect();
         let ln_z = ln_sum(&ln_cells);
         Periodogram {

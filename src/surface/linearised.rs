@@ -5,6 +5,7 @@ use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
+use crate::planets::periodogram::nights::{Nights, Offsets, beside_offsets};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
@@ -57,11 +58,25 @@ pub struct WithoutJitter {
     pub found_kms: f64,
     /// Scale of its prior (km/s), where it has one.
     pub scale_kms: Option<f64>,
+    /// Nights whose RV offsets are not known, where the profiles tell offsets from a jitter.
+    pub nights: Option<Nights>,
 }
 
 impl WithoutJitter {
-    /// The likelihood of these velocities of this star beside jitters of several sizes.
+    /// The likelihood of these velocities of this star, of all profiles or of some in their order, beside jitters and
+    /// offsets of nights of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
+        self.beside_offsets(quadratic).map_or_else(|| self.beside_jitter(quadratic), |(all, _)| all)
+    }
+
+    /// The same with what is said of the offsets; `None` where without a planet none are the most likely.
+    pub fn beside_offsets(&self, quadratic: &VelocityQuadratic) -> Option<(Jitters, Offsets)> {
+        let nights = self.nights.as_ref()?.of(&quadratic.cycles, &self.here.quadratic.cycles);
+        beside_offsets(quadratic, &nights, (self.found_kms, self.scale_kms))
+    }
+
+    /// Beside jitters of several sizes alone.
+    pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
         match self.found_kms > 0.0 {
             true => Jitters::new(quadratic, self.found_kms, self.scale_kms),
             false => Jitters::none(quadratic),

@@ -68,7 +68,7 @@ impl KnownPlanets {
             // of a single one as the star is
             ([_, _, ..], Some(without)) => {
                 let rest = beside(others(ephemerides, ephemeris), &without.here.quadratic);
-                without.beside(&rest).as_found().quadratic.clone()
+                without.beside_jitter(&rest).as_found().quadratic.clone()
             }
             _ => beside(others(ephemerides, ephemeris), &here.quadratic).into_owned(),
         })
@@ -146,8 +146,8 @@ impl KnownPlanets {
         self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned)
     }
 
-    /// The likelihood of the velocities of the star `here` with the orbits of all left free, beside the jitter where
-    /// the profiles say how large it is.
+    /// The likelihood of the velocities of the star `here` with the orbits of all left free, beside the jitter and
+    /// the offsets of nights where the profiles say how large these are.
     pub fn jitters(&self, here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
         match without_jitter {
             Some(without) => without.beside(&self.beside(&without.here.quadratic)),

@@ -9,16 +9,19 @@
 
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
-use super::jitter::{Jitters, ln_prior};
+use super::jitter::Jitters;
+use super::nights::{Beside, Nights, Scatter, beside, scatters};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::numerics::once;
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Sizes of the jitter grow by this factor.
+/// Sizes of the jitter grow by this factor; beside offsets of nights, these and the jitter by the other.
 const STEP: f64 = std::f64::consts::SQRT_2;
+const STEP_BESIDE_OFFSETS: f64 = 2.0;
 
 /// The smallest one, of the standard error of a velocity.
 const SMALLEST: f64 = 0.35;
@@ -39,12 +42,12 @@ pub struct OfField {
 }
 
 /// What is known of the jitter.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Jitter {
     /// All: it is among the noise.
     Known,
-    /// It is fitted, its prior of that scale (km/s).
-    Fitted(Option<f64>),
+    /// It is fitted, its prior of that scale (km/s), as are offsets of these nights.
+    Fitted(Option<f64>, Option<Nights>),
 }
 
 /// A star without a planet, into which orbits are put.
@@ -57,16 +60,17 @@ pub struct Injections<'a> {
     trials: DMatrix<f64>,
 }
 
-/// One field, with jitters of all sizes.
+/// One field, with jitters and offsets of all sizes.
 struct Field<'a> {
     star: &'a OfField,
     scale_kms: Option<f64>,
+    nights: Nights,
     sizes: Vec<Size>,
 }
 
-/// A jitter of one size.
+/// A jitter and offsets of one size.
 struct Size {
-    kms: f64,
+    scatter: Scatter,
     /// From the gradient without a jitter to that beside it.
     left: DMatrix<f64>,
     /// From the gradient in (a, b) at every trial period to whitened amplitudes: lower factors of the information;
@@ -115,7 +119,7 @@ impl<'a> Injections<'a> {
     /// that false-alarm `probability`.
     pub fn new(
         fields: &'a [OfField],
-        jitter: Jitter,
+        jitter: &Jitter,
         most_kms: f64,
         frequencies: &'a Frequencies,
         settings: SearchSettings,
@@ -125,7 +129,7 @@ impl<'a> Injections<'a> {
         let fields = fields.iter().map(|star| Field::new(star, jitter, most_kms, frequencies)).collect();
         let settings = match jitter {
             Jitter::Known => settings,
-            Jitter::Fitted(_) => SearchSettings { draws: DRAWS.min(settings.draws), ..settings },
+            Jitter::Fitted(..) => SearchSettings { draws: DRAWS.min(settings.draws), ..settings },
         };
         Injections { fields, frequencies, settings, probability, trials }
     }
@@ -141,10 +145,13 @@ impl<'a> Injections<'a> {
 
     fn level(&self, field: &Field, size: &Size) -> f64 {
         *once::found(&size.level, || {
-            let velocities = &field.star.velocities;
-            let jitters = match size.kms > 0.0 {
-                true => Jitters::new(velocities, size.kms, field.scale_kms),
-                false => Jitters::none(velocities),
+            let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
+            let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
+            let of_offsets = || beside(velocities, &field.nights, size.scatter, (jitter_kms, field.scale_kms));
+            let jitters = match (jitter_kms > 0.0, night_kms > 0.0) {
+                (false, false) => Jitters::none(velocities),
+                (true, false) => of_jitter(),
+                (_, true) => of_offsets().unwrap_or_else(of_jitter),
             };
             let SearchSettings { draws, seed } = self.settings;
             FalseAlarm::draw(&jitters, &self.frequencies.per_cycle, draws, seed).level(self.probability)
@@ -153,22 +160,32 @@ impl<'a> Injections<'a> {
 }
 
 impl<'a> Field<'a> {
-    fn new(star: &'a OfField, jitter: Jitter, most_kms: f64, frequencies: &Frequencies) -> Self {
-        let eigen = star.velocities.information.clone().symmetric_eigen();
-        let lambda = eigen.eigenvalues.map(|l| l.max(0.0));
-        let error_kms = (lambda.len() as f64 / lambda.sum()).sqrt();
-        let (mut kms, mut scale_kms) = (vec![0.0], None);
-        if let Jitter::Fitted(scale) = jitter {
-            scale_kms = scale;
-            let mut next = SMALLEST * error_kms;
-            while next < STEP * most_kms.max(error_kms) {
+    fn new(star: &'a OfField, jitter: &Jitter, most_kms: f64, frequencies: &Frequencies) -> Self {
+        let velocities = &star.velocities;
+        let error_kms = (velocities.len() as f64 / velocities.information.trace()).sqrt();
+        let sizes = |step: f64| {
+            let (mut kms, mut next) = (vec![0.0], SMALLEST * error_kms);
+            while next < step * most_kms.max(error_kms) {
                 kms.push(next);
-                next *= STEP;
+                next *= step;
             }
-        }
-        let size =
-            |kms: f64| Size::new((kms, scale_kms), &star.velocities, (&lambda, &eigen.eigenvectors), frequencies);
-        Field { star, scale_kms, sizes: kms.into_iter().map(size).collect() }
+            kms
+        };
+        let (scale_kms, nights, scatters) = match jitter {
+            Jitter::Known => (None, None, scatters(&[0.0], &[0.0])),
+            Jitter::Fitted(scale_kms, None) => (*scale_kms, None, scatters(&sizes(STEP), &[0.0])),
+            Jitter::Fitted(scale_kms, nights) => {
+                let sizes = sizes(STEP_BESIDE_OFFSETS);
+                (*scale_kms, nights.clone(), scatters(&sizes, &sizes))
+            }
+        };
+        let nights = nights.unwrap_or_else(|| Nights::none(velocities.len()));
+        let size = |scatter: &Scatter| {
+            let beside = Beside::new(velocities, &nights, *scatter, scale_kms)?;
+            Some(Size::new(*scatter, &beside, velocities, frequencies))
+        };
+        let sizes = scatters.par_iter().filter_map(size).collect();
+        Field { star, scale_kms, nights, sizes }
     }
 
     /// With `orbits` of 1 km/s, cos and sin of one period.
@@ -189,27 +206,21 @@ impl<'a> Field<'a> {
 }
 
 impl Size {
-    fn new(
-        (kms, scale_kms): (f64, Option<f64>),
-        without: &VelocityQuadratic,
-        (lambda, u): (&DVector<f64>, &DMatrix<f64>),
-        all: &Frequencies,
-    ) -> Self {
-        let left = lambda.map(|l| 1.0 / (1.0 + kms * kms * l));
-        let among = |d: &DVector<f64>| u * DMatrix::from_diagonal(d) * u.transpose();
-        let information = among(&lambda.component_mul(&left));
-        let beside = VelocityQuadratic {
+    fn new(scatter: Scatter, beside: &Beside, without: &VelocityQuadratic, all: &Frequencies) -> Self {
+        let left = beside.left(&without.information);
+        let information = &left * &without.information;
+        let quadratic = VelocityQuadratic {
             cycles: without.cycles.clone(),
-            gradient: DVector::zeros(lambda.len()),
+            gradient: DVector::zeros(without.len()),
             information: 0.5 * (&information + information.transpose()),
         };
-        let trials = scan(&beside, &all.per_cycle);
+        let trials = scan(&quadratic, &all.per_cycle);
         Size {
-            kms,
-            left: among(&left),
+            scatter,
+            left,
             factors: trials.iter().map(|trial| factor(trial).unwrap_or(UNBOUNDED)).collect(),
-            constant: 0.5 * left.map(f64::ln).sum() + ln_prior(kms, scale_kms),
-            directions: DMatrix::from_diagonal(&left.map(|left| kms * (0.5 * left).sqrt())) * u.transpose(),
+            constant: beside.constant,
+            directions: &beside.solved * std::f64::consts::FRAC_1_SQRT_2,
             level: OnceLock::new(),
         }
     }
@@ -284,7 +295,12 @@ impl Column<'_, '_> {
         let bounded = |size: usize, trial: usize| field.sizes[size].factors[trial] != UNBOUNDED;
         let frequencies = &self.all.frequencies.per_cycle;
         let of_size = |size: usize| (0..frequencies.len()).map(move |trial| (size, trial));
-        let all = (0..alone.len()).flat_map(of_size).filter(|&(size, trial)| bounded(size, trial));
+        // as a search: where without a planet no offsets suit best, none are tried
+        let has_offsets = |size: usize| field.sizes[size].scatter.night_kms > 0.0;
+        let all = (0..alone.len())
+            .filter(|&size| has_offsets(best_alone) || !has_offsets(size))
+            .flat_map(of_size)
+            .filter(|&(size, trial)| bounded(size, trial));
         let total = |&(size, trial): &(usize, usize)| alone[size] + height(size, trial);
         let best @ (size, trial) = all.max_by(|a, b| total(a).total_cmp(&total(b)))?;
         let [a, b] = [whitened[size][2 * trial], whitened[size][2 * trial + 1]];
@@ -365,7 +381,7 @@ mod tests {
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
         let settings = SearchSettings { draws: 1000, seed: 1 };
         let highest = |stars: &[OfField], k_kms: f64| {
-            let injections = Injections::new(stars, Jitter::Known, 0.6, &frequencies, settings, 0.01);
+            let injections = Injections::new(stars, &Jitter::Known, 0.6, &frequencies, settings, 0.01);
             injections.column(1.7).highest(k_kms, 0.4).unwrap()
         };
         let of_field = |field: usize, k_kms: f64| highest(&stars[field..=field], k_kms);
@@ -380,7 +396,7 @@ mod tests {
         }
     }
 
-    /// Against the search of velocities with the orbit in them, jitter by jitter.
+    /// Against velocities with the orbit in them, jitter by jitter and offset by offset.
     #[test]
     fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
         let cycles = uneven(20, 5.0);
@@ -389,34 +405,41 @@ mod tests {
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
         let settings = SearchSettings { draws: 1000, seed: 1 };
         let star = [OfField { velocities: without.clone(), held: without.clone(), ln_posterior: 0.0 }];
-        let injections = Injections::new(&star, Jitter::Fitted(None), 0.6, &frequencies, settings, 0.01);
-        for (period, k_kms, phi) in [(1.7, 0.0, 0.0), (1.7, 0.3, 0.4), (0.61, 0.6, 0.9)] {
-            let found = injections.column(period).highest(k_kms, phi).unwrap();
-            let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
-            let moved = &without.gradient + &without.information * velocities(&cycles, 1.0 / period, ab);
-            let moved = VelocityQuadratic { gradient: moved, ..without.clone() };
-            let (mut with, mut alone) = ((f64::NEG_INFINITY, 0.0, 0.0), f64::NEG_INFINITY);
-            for size in &injections.fields[0].sizes {
-                // ln L of this size above none, and the best orbit beside it
-                let [none, here] = match size.kms > 0.0 {
-                    true => {
-                        let both = Jitters::new(&moved, size.kms, None);
-                        [0, 4].map(|k| both.levels()[k].clone())
+        let pairs: Vec<Vec<usize>> = (0..10).map(|night| vec![2 * night, 2 * night + 1]).collect();
+        for fitted in [Jitter::Fitted(None, None), Jitter::Fitted(None, Nights::new(20, &pairs))] {
+            let injections = Injections::new(&star, &fitted, 0.6, &frequencies, settings, 0.01);
+            let nights = &injections.fields[0].nights;
+            for (period, k_kms, phi) in [(1.7, 0.0, 0.0), (1.7, 0.3, 0.4), (0.61, 0.6, 0.9)] {
+                let found = injections.column(period).highest(k_kms, phi).unwrap();
+                let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
+                let moved = &without.gradient + &without.information * velocities(&cycles, 1.0 / period, ab);
+                let moved = VelocityQuadratic { gradient: moved, ..without.clone() };
+                let of = |size: &Size| (size.scatter, Beside::new(&moved, nights, size.scatter, None).unwrap());
+                let all: Vec<(Scatter, Beside)> = injections.fields[0].sizes.iter().map(of).collect();
+                let (null, alone) = all.iter().max_by(|a, b| a.1.height.total_cmp(&b.1.height)).unwrap();
+                let mut with = (f64::NEG_INFINITY, 0.0);
+                for (scatter, beside) in &all {
+                    if scatter.night_kms > 0.0 && null.night_kms == 0.0 {
+                        continue;
                     }
-                    false => [0, 0].map(|k| Jitters::none(&moved).levels()[k].clone()),
-                };
-                let ln_l = here.ln_l - none.ln_l;
-                alone = alone.max(ln_l);
-                for orbit in scan(&here.quadratic, &frequencies.per_cycle).into_iter().filter_map(|trial| trial.orbit) {
-                    if ln_l + orbit.delta_ln_l > with.0 {
-                        with = (ln_l + orbit.delta_ln_l, orbit.k_kms, size.kms);
+                    let left = beside.left(&moved.information);
+                    let here = VelocityQuadratic {
+                        gradient: &left * &moved.gradient,
+                        information: &left * &moved.information,
+                        ..moved.clone()
+                    };
+                    for orbit in scan(&here, &frequencies.per_cycle).into_iter().filter_map(|trial| trial.orbit) {
+                        if beside.height + orbit.delta_ln_l > with.0 {
+                            with = (beside.height + orbit.delta_ln_l, orbit.k_kms);
+                        }
                     }
                 }
-            }
-            assert!((found.delta_ln_l - (with.0 - alone)).abs() < 1e-8, "{found:?} {with:?} {alone}");
-            assert!((found.k_kms - with.1).abs() < 1e-8, "{found:?} {with:?}");
-            if k_kms > 0.2 {
-                assert!((found.frequency * period - 1.0).abs() < 0.02 && found.delta_ln_l > found.level, "{found:?}");
+                assert!((found.delta_ln_l - (with.0 - alone.height)).abs() < 1e-8, "{found:?} {with:?}");
+                assert!((found.k_kms - with.1).abs() < 1e-8, "{found:?} {with:?}");
+                if k_kms > 0.2 {
+                    assert!((found.frequency * period - 1.0).abs() < 0.02, "{found:?}");
+                    assert!(found.delta_ln_l > found.level, "{found:?}");
+                }
             }
         }
     }

@@ -21,17 +21,24 @@ pub fn ln_prior(jitter_kms: f64, scale_kms: Option<f64>) -> f64 {
     scale_kms.map_or(0.0, |scale| -(jitter_kms / scale).powi(2).ln_1p())
 }
 
-/// ln L of the velocities beside jitters of several sizes.
+/// ln of the share of each size of a prior that is uniform up to the largest.
+pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
+    let last = sizes.len() - 1;
+    let share = |k: usize| 0.5 * (sizes[(k + 1).min(last)] - sizes[k.saturating_sub(1)]) / sizes[last];
+    if last == 0 { vec![0.0] } else { (0..=last).map(|k| share(k).ln()).collect() }
+}
+
+/// ln L of the velocities beside jitters of several sizes, and offsets of nights (`nights`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jitters {
     pub(super) levels: Vec<Level>,
+    /// ln of the share of each of a prior that is uniform up to the largest.
+    pub(super) ln_shares: Vec<f64>,
 }
 
 /// One size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
-    /// Standard deviation of the jitter (km/s).
-    pub size_kms: f64,
     /// ln L of the velocities.
     pub quadratic: VelocityQuadratic,
     /// ln L at velocities 0, the prior of the size counted, above that of the best size.
@@ -68,7 +75,6 @@ impl Jitters {
     /// No jitter.
     pub fn none(quadratic: &VelocityQuadratic) -> Self {
         let level = Level {
-            size_kms: 0.0,
             quadratic: quadratic.clone(),
             ln_l: 0.0,
             root: root(&quadratic.information),
@@ -76,7 +82,7 @@ impl Jitters {
             squares: DVector::zeros(0),
             rotation: DMatrix::zeros(0, 0),
         };
-        Jitters { levels: vec![level] }
+        Jitters { levels: vec![level], ln_shares: vec![0.0] }
     }
 
     /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet, with the
@@ -94,7 +100,6 @@ impl Jitters {
             let constant = 0.5 * left.map(f64::ln).sum() + ln_prior(size * found_kms, scale_kms);
             let information = among(lambda.component_mul(&left));
             Level {
-                size_kms: size * found_kms,
                 ln_l: constant + 0.5 * variance * pulled.component_mul(&pulled).dot(&left),
                 quadratic: VelocityQuadratic {
                     cycles: without.cycles.clone(),
@@ -110,21 +115,15 @@ impl Jitters {
         let mut levels = SIZES.map(level).to_vec();
         let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
         levels.iter_mut().for_each(|level| level.ln_l -= best);
-        Jitters { levels }
+        Jitters { levels, ln_shares: ln_shares(&SIZES) }
     }
 
     /// ln L of no planet with each size, times its share of a prior that is uniform up to the largest.
     pub fn ln_weights(&self) -> Vec<f64> {
-        let last = self.levels.len() - 1;
-        if last == 0 {
-            return vec![0.0];
-        }
-        let size = |k: usize| self.levels[k.min(last)].size_kms;
-        let share = |k: usize| 0.5 * (size(k + 1) - size(k.saturating_sub(1))) / size(last);
-        (0..=last).map(|k| self.levels[k].ln_l + share(k).ln()).collect()
+        self.levels.iter().zip(&self.ln_shares).map(|(level, ln_share)| level.ln_l + ln_share).collect()
     }
 
-    /// All sizes, from small to large.
+    /// All sizes.
     pub fn levels(&self) -> &[Level] {
         &self.levels
     }

@@ -1,39 +1,35 @@
-//! RV offsets that all profiles of a night share, of unknown size: whether a planet is significant beside them.
+//! RV offsets that all profiles of a night share, of unknown size, beside the orbit and a jitter of each profile.
 //!
 //! A spectrograph whose zero point changes from night to night looks like a planet of several days. A jitter s of each
 //! profile and offsets t of the nights have the covariance `J = L L'` with `L = [s 1 | t N]`, N telling which profile
 //! is of which night. Beside it ln L of information I and gradient g has the information `I - I M I` and the gradient
 //! `(1 - I M) g`, `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As
 //! beside a jitter alone (`jitter`), s and t are those that suit best, without an orbit and with each orbit. Stars
-//! without a planet, with the offsets that are the most likely without one, say how often a peak is as high, or K of a
-//! known planet.
+//! without a planet have those that are the most likely without one.
 
+use super::SearchSettings;
 use super::draws::amplitudes;
-use super::jitter::{Jitters, Level, ln_prior, root};
-use super::{FalseAlarm, Frequencies, SearchSettings};
+use super::jitter::{Jitters, Level, ln_prior, ln_shares, root};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Sizes of the jitter of which the most likely is sought, of the one found without offsets.
+/// Sizes of the jitter that are tried, of the one found without offsets.
 const JITTERS: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 
 /// Offsets of which the most likely is sought, of the scatter of the velocities: from the first to the last, each
 /// larger by a factor.
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
-/// Jitters and offsets that are tried with each orbit, of the most likely ones.
-const PARTS: ([f64; 4], [f64; 5]) = ([0.0, 0.5, 1.0, std::f64::consts::SQRT_2], [0.0, 0.35, 0.7, 1.0, 1.4]);
+/// Offsets that are tried with each orbit, of the most likely ones.
+const PARTS: [f64; 4] = [0.0, 0.5, 1.0, 1.4];
 
 /// Scale of the prior of the offsets of a spectrograph of unknown stability (km/s): that of ESPaDOnS and Narval.
 const USUAL_KMS: f64 = 0.03;
 
 /// Nights of two profiles at least: fewer do not tell offsets from a jitter.
 const NIGHTS: usize = 3;
-
-/// Stars that are drawn: the probability is compared with 1 %.
-const DRAWS: usize = 2_000;
 
 /// What offsets of nights make of a planet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,35 +40,59 @@ pub struct NightOffsets {
     pub gain: f64,
     /// How often stars without it, with such offsets, show a peak as high, or of a known planet such a K.
     pub false_alarm_probability: f64,
+    /// The same of the highest peak where nights had no offsets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub without_offsets: Option<f64>,
 }
 
-/// A planet that is compared with offsets.
-#[derive(Clone, Copy, Debug)]
-pub enum Compared<'a> {
-    /// The peak at one of the frequencies (orbits a rotation cycle).
-    Peak(f64, &'a Frequencies),
-    /// One of which K alone is unknown: its velocities for a K of 1.
-    Known(&'a DVector<f64>),
+/// Which profiles are of which night.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nights(DMatrix<f64>);
+
+impl Nights {
+    /// The profiles of each night. `None` where they do not tell offsets from a jitter.
+    pub fn new(profiles: usize, nights: &[Vec<usize>]) -> Option<Self> {
+        if nights.iter().filter(|night| night.len() > 1).count() < NIGHTS {
+            return None;
+        }
+        let mut of_night = DMatrix::zeros(profiles, nights.len());
+        for (night, profiles) in nights.iter().enumerate() {
+            profiles.iter().for_each(|k| of_night[(*k, night)] = 1.0);
+        }
+        Some(Nights(of_night))
+    }
+
+    /// None.
+    pub(super) fn none(profiles: usize) -> Self {
+        Nights(DMatrix::zeros(profiles, 0))
+    }
+
+    /// Of the profiles that are left of `all`, both in the same order, by their rotation cycles.
+    #[must_use]
+    pub fn of(&self, left: &[f64], all: &[f64]) -> Self {
+        let mut left = left.iter().peekable();
+        let kept: Vec<usize> = (0..all.len()).filter(|k| left.next_if(|cycle| **cycle == all[*k]).is_some()).collect();
+        Nights(self.0.select_rows(&kept))
+    }
 }
 
-/// What offsets of `nights` make of a planet, beside a jitter which is `found_kms` in a star without it and has a prior
-/// of that scale; the offsets have the same prior, or that of 30 m/s. `None` where the profiles do not tell the offsets
-/// from a jitter, show none, or no orbit is bounded.
-pub fn night_offsets(
+/// Offsets of nights in a star without a planet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offsets {
+    /// Their most likely standard deviation (km/s).
+    pub sigma_kms: f64,
+    /// By how much they raise ln L, their prior counted.
+    pub gain: f64,
+}
+
+/// The likelihood of the velocities beside a jitter, which is `found_kms` in a star without a planet and has a prior of
+/// that scale, and offsets of `nights`, which have the same prior, or that of 30 m/s. `None` where without a planet
+/// none are more likely than any.
+pub fn beside_offsets(
     without: &VelocityQuadratic,
-    nights: &[Vec<usize>],
+    nights: &Nights,
     (found_kms, scale_kms): (f64, Option<f64>),
-    planet: Compared,
-    settings: SearchSettings,
-) -> Option<NightOffsets> {
-    if nights.iter().filter(|night| night.len() > 1).count() < NIGHTS {
-        return None;
-    }
-    let mut of_night = DMatrix::zeros(without.len(), nights.len());
-    for (night, profiles) in nights.iter().enumerate() {
-        profiles.iter().for_each(|k| of_night[(*k, night)] = 1.0);
-    }
-    let beside = |scatter: Scatter| Beside::new(without, &of_night, scatter, scale_kms);
+) -> Option<(Jitters, Offsets)> {
     let error_kms = (without.len() as f64 / without.information.trace()).sqrt();
     let (first, last, factor) = OFFSETS;
     let mut sizes = vec![0.0];
@@ -81,70 +101,87 @@ pub fn night_offsets(
         sizes.push(size * found_kms.max(error_kms));
         size *= factor;
     }
-    let tried = scatters(JITTERS.map(|part| part * found_kms), &sizes);
-    let heights: Vec<f64> =
-        tried.par_iter().map(|one| beside(*one).map_or(f64::NEG_INFINITY, |beside| beside.height)).collect();
+    let tried = scatters(&jitters(found_kms), &sizes);
+    let height =
+        |one: &Scatter| Beside::new(without, nights, *one, scale_kms).map_or(f64::NEG_INFINITY, |of| of.height);
+    let heights: Vec<f64> = tried.par_iter().map(height).collect();
     let highest = |with: bool| {
         let among = (0..tried.len()).filter(|k| with || tried[*k].night_kms == 0.0);
         among.max_by(|a, b| heights[*a].total_cmp(&heights[*b]))
     };
     let (plain, best) = (highest(false)?, highest(true)?);
     let null = tried[best];
-    if null.night_kms == 0.0 {
-        return None;
-    }
-    let (jitters, offsets) = PARTS;
-    let mut parts = scatters(jitters.map(|part| part * null.jitter_kms), &offsets.map(|part| part * null.night_kms));
-    parts.push(Scatter { jitter_kms: found_kms, night_kms: 0.0 });
-    let all = of_scatters(without, beside(null)?, parts.into_par_iter().filter_map(beside).collect());
-    let (draws, seed) = (DRAWS.min(settings.draws), settings.seed);
-    let false_alarm_probability = match planet {
-        Compared::Peak(frequency, frequencies) => {
-            let height = all.orbit_at(frequency)?.delta_ln_l;
-            FalseAlarm::draw(&all, &frequencies.per_cycle, draws, seed).probability(height).value()
-        }
-        Compared::Known(unit) => {
-            let height = all.height_above_zero(unit);
-            let above = amplitudes(&all, unit, draws, seed).into_iter().filter(|drawn| *drawn >= height).count();
-            (1 + above) as f64 / (1 + draws) as f64
-        }
-    };
-    Some(NightOffsets { sigma_kms: null.night_kms, gain: heights[best] - heights[plain], false_alarm_probability })
+    let offsets = Offsets { sigma_kms: null.night_kms, gain: heights[best] - heights[plain] };
+    let all = || beside(without, nights, null, (found_kms, scale_kms));
+    if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
+}
+
+/// The same where `null` is the scatter of stars without a planet, and the jitter up to `found_kms`.
+pub(super) fn beside(
+    without: &VelocityQuadratic,
+    nights: &Nights,
+    null: Scatter,
+    (found_kms, scale_kms): (f64, Option<f64>),
+) -> Option<Jitters> {
+    let (jitters, offsets) = (jitters(found_kms), PARTS.map(|part| part * null.night_kms));
+    let of = |one: Scatter| Beside::new(without, nights, one, scale_kms);
+    let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
+    let found = of_scatters(without, &of(null)?, &all?);
+    let shares =
+        ln_shares(&offsets).into_iter().flat_map(|night| ln_shares(&jitters).into_iter().map(move |s| s + night));
+    Some(Jitters { ln_shares: shares.collect(), ..found })
+}
+
+/// What offsets of nights, as for [`beside_offsets`], make of a known planet, its velocities for a K of 1.
+pub fn known_beside_offsets(
+    without: &VelocityQuadratic,
+    nights: &Nights,
+    jitter: (f64, Option<f64>),
+    unit: &DVector<f64>,
+    settings: SearchSettings,
+) -> Option<NightOffsets> {
+    let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter)?;
+    let height = all.height_above_zero(unit);
+    let drawn = amplitudes(&all, unit, settings.draws, settings.seed);
+    let above = drawn.into_iter().filter(|drawn| *drawn >= height).count();
+    let false_alarm_probability = (1 + above) as f64 / (1 + settings.draws) as f64;
+    Some(NightOffsets { sigma_kms, gain, false_alarm_probability, without_offsets: None })
+}
+
+/// Sizes of a jitter that is `found_kms` without offsets.
+fn jitters(found_kms: f64) -> Vec<f64> {
+    if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] }
 }
 
 /// Standard deviations of jitter and offsets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Scatter {
-    jitter_kms: f64,
-    night_kms: f64,
+pub(super) struct Scatter {
+    pub jitter_kms: f64,
+    pub night_kms: f64,
 }
 
-/// Each of the jitters with each of the offsets, once.
-fn scatters<const N: usize>(mut jitters_kms: [f64; N], nights_kms: &[f64]) -> Vec<Scatter> {
-    jitters_kms.sort_by(f64::total_cmp);
-    let mut jitters = jitters_kms.to_vec();
-    jitters.dedup();
-    let with = |night_kms: f64| jitters.iter().map(move |kms| Scatter { jitter_kms: *kms, night_kms });
+/// Each of the jitters with each of the offsets.
+pub(super) fn scatters(jitters_kms: &[f64], nights_kms: &[f64]) -> Vec<Scatter> {
+    let with = |night_kms: f64| jitters_kms.iter().map(move |kms| Scatter { jitter_kms: *kms, night_kms });
     nights_kms.iter().copied().flat_map(with).collect()
 }
 
 /// The velocities beside a jitter and offsets.
-struct Beside {
-    scatter: Scatter,
+pub(super) struct Beside {
     /// L.
     columns: DMatrix<f64>,
     /// `C^-1 L'`, `A = C C'`: M is its square.
-    solved: DMatrix<f64>,
+    pub solved: DMatrix<f64>,
     /// `-ln det A / 2`, the prior counted.
-    constant: f64,
+    pub constant: f64,
     /// ln L at velocities 0, the prior counted, above that without jitter and offsets.
-    height: f64,
+    pub height: f64,
 }
 
 impl Beside {
-    fn new(
+    pub fn new(
         without: &VelocityQuadratic,
-        of_night: &DMatrix<f64>,
+        Nights(of_night): &Nights,
         scatter: Scatter,
         scale_kms: Option<f64>,
     ) -> Option<Self> {
@@ -159,19 +196,23 @@ impl Beside {
         let inner = DMatrix::identity(jitter + nights, jitter + nights) + 0.5 * (&inner + inner.transpose());
         let factor = inner.cholesky()?.unpack();
         let solved = factor.solve_lower_triangular(&columns.transpose())?;
-        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior(night_kms, scale_kms.or(Some(USUAL_KMS)));
+        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior_of_offsets(night_kms, scale_kms.unwrap_or(USUAL_KMS));
         let constant = prior - factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let height = constant + 0.5 * (&solved * &without.gradient).norm_squared();
-        Some(Beside { scatter, columns, solved, constant, height })
+        Some(Beside { columns, solved, constant, height })
+    }
+
+    /// From gradients without it to those beside it.
+    pub fn left(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = information.nrows();
+        DMatrix::identity(n, n) - information * self.solved.tr_mul(&self.solved)
     }
 
     /// The likelihood of the velocities beside it, where gradients of stars without a planet have that `root`.
     fn level(&self, without: &VelocityQuadratic, root: &DMatrix<f64>, best: f64) -> Level {
-        let n = without.len();
-        let kept = DMatrix::identity(n, n) - &without.information * self.solved.tr_mul(&self.solved);
+        let kept = self.left(&without.information);
         let information = &kept * &without.information;
         Level {
-            size_kms: self.scatter.jitter_kms,
             quadratic: VelocityQuadratic {
                 cycles: without.cycles.clone(),
                 gradient: &kept * &without.gradient,
@@ -186,13 +227,19 @@ impl Beside {
     }
 }
 
+/// ln of the prior of offsets (km/s) beside that of none: of the scatter of a spectrograph, half-Gaussian. That of a
+/// jitter falls off too slowly here: planets would pass for offsets of several times what spectrographs have.
+fn ln_prior_of_offsets(night_kms: f64, scale_kms: f64) -> f64 {
+    -0.5 * (night_kms / scale_kms).powi(2)
+}
+
 /// The likelihood beside `all` of these, stars without a planet being those of `null`.
-fn of_scatters(without: &VelocityQuadratic, null: Beside, all: Vec<Beside>) -> Jitters {
+fn of_scatters(without: &VelocityQuadratic, null: &Beside, all: &[Beside]) -> Jitters {
     let moved = &without.information * &null.columns;
     let root = root(&(&without.information + &moved * moved.transpose()));
     let best = all.iter().map(|beside| beside.height).fold(f64::NEG_INFINITY, f64::max);
     let levels = all.iter().map(|beside| beside.level(without, &root, best)).collect();
-    Jitters { levels }
+    Jitters { levels, ln_shares: Vec::new() }
 }
 
 #[cfg(test)]

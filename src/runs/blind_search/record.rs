@@ -327,7 +327,7 @@ pub struct RobustnessRecord {
     /// The sum over them of what the planet adds to their prediction; null for less than two nights.
     #[serde(default)]
     pub held_out_nights: Option<HeldOut>,
-    /// What RV offsets of nights make of the highest peak, if it is a candidate.
+    /// RV offsets of nights beside which the highest peak is judged; absent where none are likely.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_offsets: Option<NightOffsets>,
 }

@@ -15,7 +15,7 @@ use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Linearised, SurfaceError, SurfaceModel};
+use crate::surface::{At, Linearised, SurfaceError, SurfaceModel, WithoutJitter};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -103,7 +103,8 @@ impl<'a> Shortcut<'a> {
             BestOrbit::In => false,
         };
         let mut star = found.planet_free.clone();
-        let jitter = found.without_jitter.as_ref().map_or(Jitter::Known, |without| Jitter::Fitted(without.scale_kms));
+        let fitted = |of: &WithoutJitter| Jitter::Fitted(of.scale_kms, of.nights.clone());
+        let jitter = found.without_jitter.as_ref().map_or(Jitter::Known, fitted);
         let (mut before, mut removed) = (found.blind.clone(), None);
         let mut at = At { imager, values, nuisances: &detection.nuisances };
         found.known.write(&mut at.values);
@@ -159,7 +160,7 @@ impl<'a> Shortcut<'a> {
     pub fn searches(&self, most_kms: f64) -> Searches<'_> {
         let LimitSettings { detection, frequencies, .. } = self.settings;
         let injections = (!self.fields.is_empty()).then(|| {
-            Injections::new(&self.fields, self.jitter, most_kms, frequencies, detection.search, CANDIDATE_FAP)
+            Injections::new(&self.fields, &self.jitter, most_kms, frequencies, detection.search, CANDIDATE_FAP)
         });
         Searches { shortcut: self, injections }
     }

@@ -4,6 +4,7 @@ use super::linearised::linearised;
 use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, fit, nights, optimum};
 use crate::field::Lifetime;
 use crate::model::{ParameterSpace, ParameterValues};
+use crate::planets::periodogram::nights::Nights;
 use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
@@ -71,13 +72,14 @@ impl SurfaceModel for EvolvingMap {
         if self.known.jitter_kms.is_some() {
             return Ok(None);
         }
+        let nights = Nights::new(here.quadratic.len(), &at.imager.nights_of_sets());
         if found_kms <= 0.0 {
-            return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0, scale_kms }));
+            return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0, scale_kms, nights }));
         }
         let marginal = fitted.marginal.without_jitter(at.imager)?;
         let without = linearised(at.imager, Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
         let here = Linearised { field: here.field.clone(), ..without };
-        Ok(Some(WithoutJitter { here, found_kms, scale_kms }))
+        Ok(Some(WithoutJitter { here, found_kms, scale_kms, nights }))
     }
 
     fn absorbing(&self, at: At, here: &Linearised) -> Result<Vec<OfField>, SurfaceError> {
