@@ -5,7 +5,7 @@ use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
-use crate::planets::periodogram::nights::{Nights, Offsets, beside_offsets};
+use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
@@ -66,13 +66,12 @@ impl WithoutJitter {
     /// The likelihood of these velocities of this star, of all profiles or of some in their order, beside jitters and
     /// offsets of nights of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        self.beside_offsets(quadratic).map_or_else(|| self.beside_jitter(quadratic), |(all, _)| all)
-    }
-
-    /// The same with what is said of the offsets; `None` where without a planet none are the most likely.
-    pub fn beside_offsets(&self, quadratic: &VelocityQuadratic) -> Option<(Jitters, Offsets)> {
-        let nights = self.nights.as_ref()?.of(&quadratic.cycles, &self.here.quadratic.cycles);
-        beside_offsets(quadratic, &nights, (self.found_kms, self.scale_kms))
+        let beside = |nights: &Nights| {
+            let nights = nights.of(&quadratic.cycles, &self.here.quadratic.cycles);
+            beside_offsets(quadratic, &nights, (self.found_kms, self.scale_kms), Reach::Stable)
+        };
+        let offsets = self.nights.as_ref().and_then(beside);
+        offsets.map_or_else(|| self.beside_jitter(quadratic), |(all, _)| all)
     }
 
     /// Beside jitters of several sizes alone.

@@ -7,9 +7,7 @@ use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::nights::NightOffsets;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::posterior_shares;
-use crate::planets::verdict::{
-    CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals, false_alarm,
-};
+use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
 use crate::surface::imaging::Imager;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
@@ -91,7 +89,7 @@ impl Detection {
         let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         remarks.extend(of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
-        remarks.extend(night_offsets.and_then(of_offsets_counted));
+        remarks.extend(night_offsets.and_then(of_night_offsets));
         if self.highest().on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",
@@ -284,19 +282,7 @@ fn of_choices(robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<R
     remarks
 }
 
-/// That a signal would be significant without such offsets, beside which it is judged.
-fn of_offsets_counted(of: NightOffsets) -> Option<Remark> {
-    let NightOffsets { sigma_kms, false_alarm_probability, without_offsets, .. } = of;
-    let without = without_offsets.filter(|p| *p < CANDIDATE_FAP && false_alarm_probability >= CANDIDATE_FAP)?;
-    Some(Remark::note(format!(
-        "RV offsets of {:.0} m/s from night to night explain the velocities as well; without them {}. If those of the \
-        spectrograph are known, set observations.night_jitter_kms.",
-        1000.0 * sigma_kms,
-        false_alarm(without)
-    )))
-}
-
-/// That a known planet is not significant beside such offsets.
+/// That a signal is not significant beside such offsets.
 pub fn of_night_offsets(NightOffsets { sigma_kms, false_alarm_probability, .. }: NightOffsets) -> Option<Remark> {
     (false_alarm_probability > CANDIDATE_FAP).then(|| {
         Remark::against(

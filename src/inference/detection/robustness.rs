@@ -6,8 +6,8 @@
 
 use super::{Detection, DetectionSettings, KnownPlanet};
 use crate::model::{Parameter, ParameterValues};
-use crate::planets::periodogram::nights::{NightOffsets, Offsets, known_beside_offsets};
-use crate::planets::periodogram::{CircularOrbit, Jitters, Peak, Search, SearchSettings, orbits};
+use crate::planets::periodogram::nights::{NightOffsets, known_beside_offsets, peak_beside_offsets};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Peak, SearchSettings, orbits};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::star::observation::{NIGHT_GAP_D, nights};
@@ -168,29 +168,21 @@ pub fn robustness(
     Robustness { all, targets, nights: without.collect() }
 }
 
-/// Stars that are drawn to compare with 1 %.
-const DRAWS: usize = 2_000;
-
 impl Detection {
-    /// RV offsets of nights beside which the highest peak of the blind search is judged, and what is made of it without
-    /// them; `None` where there are none.
-    pub fn night_offsets(&self, settings: SearchSettings) -> Option<NightOffsets> {
-        let star = self.without_jitter.as_ref()?;
+    /// What RV offsets of nights, larger than the search counts, make of the highest peak, if it is a candidate beside
+    /// a fitted jitter.
+    pub fn peak_beside_nights(&self, settings: SearchSettings) -> Option<NightOffsets> {
+        let star = self.without_jitter.as_ref().filter(|_| self.is_candidate())?;
         let velocities = self.known.beside(&star.here.quadratic);
-        let (_, Offsets { sigma_kms, gain }) = star.beside_offsets(&velocities)?;
-        let settings = SearchSettings { draws: DRAWS.min(settings.draws), ..settings };
-        let without = Search::with_jitter(&star.beside_jitter(&velocities), &self.frequencies, settings);
-        let chance = |search: Search| search.false_alarm.probability(search.best().orbit.delta_ln_l).value();
-        let false_alarm_probability = self.false_alarm_probability();
-        Some(NightOffsets { sigma_kms, gain, false_alarm_probability, without_offsets: without.ok().map(chance) })
+        let (peak, jitter) = (1.0 / self.blind.best().porb_over_prot, (star.found_kms, star.scale_kms));
+        peak_beside_offsets(&velocities, star.nights.as_ref()?, jitter, (peak, &self.frequencies), settings)
     }
 
-    /// What RV offsets of nights make of a known planet that would be one: as its significance, by the star without it.
+    /// The same of a known planet that would be one: as its significance, by the star without it.
     pub fn known_beside_nights(&self, planet: &KnownPlanet, settings: SearchSettings) -> Option<NightOffsets> {
         let alone = self.alone.as_ref().filter(|_| planet.is_candidate())?;
         let star = alone.without_jitter.as_ref()?;
         let velocities = self.known.beside_others(planet, &star.here.quadratic);
-        let settings = SearchSettings { draws: DRAWS.min(settings.draws), ..settings };
         let (unit, jitter) = (planet.ephemeris.unit_velocities(&velocities.cycles), (star.found_kms, star.scale_kms));
         known_beside_offsets(&velocities, star.nights.as_ref()?, jitter, &unit, settings)
     }

@@ -10,7 +10,7 @@
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
 use super::jitter::Jitters;
-use super::nights::{Beside, Nights, Scatter, beside, scatters};
+use super::nights::{Beside, Nights, Reach, Scatter, beside, scatters};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::numerics::once;
@@ -147,7 +147,8 @@ impl<'a> Injections<'a> {
         *once::found(&size.level, || {
             let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
             let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
-            let of_offsets = || beside(velocities, &field.nights, size.scatter, (jitter_kms, field.scale_kms));
+            let jitter = (jitter_kms, field.scale_kms);
+            let of_offsets = || beside(velocities, &field.nights, size.scatter, jitter, Reach::Stable);
             let jitters = match (jitter_kms > 0.0, night_kms > 0.0) {
                 (false, false) => Jitters::none(velocities),
                 (true, false) => of_jitter(),
@@ -176,12 +177,13 @@ impl<'a> Field<'a> {
             Jitter::Fitted(scale_kms, None) => (*scale_kms, None, scatters(&sizes(STEP), &[0.0])),
             Jitter::Fitted(scale_kms, nights) => {
                 let sizes = sizes(STEP_BESIDE_OFFSETS);
-                (*scale_kms, nights.clone(), scatters(&sizes, &sizes))
+                let offsets = Reach::Stable.of(&sizes, *scale_kms);
+                (*scale_kms, nights.clone(), scatters(&sizes, &offsets))
             }
         };
         let nights = nights.unwrap_or_else(|| Nights::none(velocities.len()));
         let size = |scatter: &Scatter| {
-            let beside = Beside::new(velocities, &nights, *scatter, scale_kms)?;
+            let beside = Beside::new(velocities, &nights, *scatter, (scale_kms, Reach::Stable))?;
             Some(Size::new(*scatter, &beside, velocities, frequencies))
         };
         let sizes = scatters.par_iter().filter_map(size).collect();
@@ -414,7 +416,9 @@ mod tests {
                 let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
                 let moved = &without.gradient + &without.information * velocities(&cycles, 1.0 / period, ab);
                 let moved = VelocityQuadratic { gradient: moved, ..without.clone() };
-                let of = |size: &Size| (size.scatter, Beside::new(&moved, nights, size.scatter, None).unwrap());
+                let of = |size: &Size| {
+                    (size.scatter, Beside::new(&moved, nights, size.scatter, (None, Reach::Stable)).unwrap())
+                };
                 let all: Vec<(Scatter, Beside)> = injections.fields[0].sizes.iter().map(of).collect();
                 let (null, alone) = all.iter().max_by(|a, b| a.1.height.total_cmp(&b.1.height)).unwrap();
                 let mut with = (f64::NEG_INFINITY, 0.0);

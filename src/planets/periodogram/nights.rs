@@ -7,9 +7,9 @@
 //! beside a jitter alone (`jitter`), s and t are those that suit best, without an orbit and with each orbit. Stars
 //! without a planet have those that are the most likely without one.
 
-use super::SearchSettings;
 use super::draws::amplitudes;
 use super::jitter::{Jitters, Level, ln_prior, ln_shares, root};
+use super::{FalseAlarm, Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,14 +19,20 @@ use serde::{Deserialize, Serialize};
 const JITTERS: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 
 /// Offsets of which the most likely is sought, of the scatter of the velocities: from the first to the last, each
-/// larger by a factor.
+/// larger by a factor, within the [`Reach`].
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
 /// Offsets that are tried with each orbit, of the most likely ones.
 const PARTS: [f64; 4] = [0.0, 0.5, 1.0, 1.4];
 
-/// Scale of the prior of the offsets of a spectrograph of unknown stability (km/s): that of ESPaDOnS and Narval.
+/// Stability of a spectrograph of which none is known (km/s): that of ESPaDOnS and Narval.
 const USUAL_KMS: f64 = 0.03;
+
+/// Offsets that count in a search, of that.
+const MOST: f64 = 2.0;
+
+/// Stars that are drawn to compare with 1 %.
+const DRAWS: usize = 2_000;
 
 /// Nights of two profiles at least: fewer do not tell offsets from a jitter.
 const NIGHTS: usize = 3;
@@ -40,9 +46,15 @@ pub struct NightOffsets {
     pub gain: f64,
     /// How often stars without it, with such offsets, show a peak as high, or of a known planet such a K.
     pub false_alarm_probability: f64,
-    /// The same of the highest peak where nights had no offsets.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub without_offsets: Option<f64>,
+}
+
+/// How large offsets may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// Up to twice the stability of the spectrograph, all as probable.
+    Stable,
+    /// Any, with the prior of a jitter: what would have to be wrong with the spectrograph.
+    Any,
 }
 
 /// Which profiles are of which night.
@@ -86,12 +98,13 @@ pub struct Offsets {
 }
 
 /// The likelihood of the velocities beside a jitter, which is `found_kms` in a star without a planet and has a prior of
-/// that scale, and offsets of `nights`, which have the same prior, or that of 30 m/s. `None` where without a planet
-/// none are more likely than any.
+/// that scale, the stability of the spectrograph, and offsets of `nights` within that `reach`. `None` where without a
+/// planet none are more likely than any.
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
     (found_kms, scale_kms): (f64, Option<f64>),
+    reach: Reach,
 ) -> Option<(Jitters, Offsets)> {
     let error_kms = (without.len() as f64 / without.information.trace()).sqrt();
     let (first, last, factor) = OFFSETS;
@@ -101,9 +114,10 @@ pub fn beside_offsets(
         sizes.push(size * found_kms.max(error_kms));
         size *= factor;
     }
+    let sizes = reach.of(&sizes, scale_kms);
     let tried = scatters(&jitters(found_kms), &sizes);
-    let height =
-        |one: &Scatter| Beside::new(without, nights, *one, scale_kms).map_or(f64::NEG_INFINITY, |of| of.height);
+    let of = |one: &Scatter| Beside::new(without, nights, *one, (scale_kms, reach));
+    let height = |one: &Scatter| of(one).map_or(f64::NEG_INFINITY, |of| of.height);
     let heights: Vec<f64> = tried.par_iter().map(height).collect();
     let highest = |with: bool| {
         let among = (0..tried.len()).filter(|k| with || tried[*k].night_kms == 0.0);
@@ -112,7 +126,7 @@ pub fn beside_offsets(
     let (plain, best) = (highest(false)?, highest(true)?);
     let null = tried[best];
     let offsets = Offsets { sigma_kms: null.night_kms, gain: heights[best] - heights[plain] };
-    let all = || beside(without, nights, null, (found_kms, scale_kms));
+    let all = || beside(without, nights, null, (found_kms, scale_kms), reach);
     if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
 }
 
@@ -122,9 +136,10 @@ pub(super) fn beside(
     nights: &Nights,
     null: Scatter,
     (found_kms, scale_kms): (f64, Option<f64>),
+    reach: Reach,
 ) -> Option<Jitters> {
-    let (jitters, offsets) = (jitters(found_kms), PARTS.map(|part| part * null.night_kms));
-    let of = |one: Scatter| Beside::new(without, nights, one, scale_kms);
+    let (jitters, offsets) = (jitters(found_kms), reach.of(&PARTS.map(|part| part * null.night_kms), scale_kms));
+    let of = |one: Scatter| Beside::new(without, nights, one, (scale_kms, reach));
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
     let found = of_scatters(without, &of(null)?, &all?);
     let shares =
@@ -132,20 +147,53 @@ pub(super) fn beside(
     Some(Jitters { ln_shares: shares.collect(), ..found })
 }
 
-/// What offsets of nights, as for [`beside_offsets`], make of a known planet, its velocities for a K of 1.
+/// What offsets of nights, of any size, make of the highest peak, at one of the frequencies (orbits a rotation cycle).
+pub fn peak_beside_offsets(
+    without: &VelocityQuadratic,
+    nights: &Nights,
+    jitter: (f64, Option<f64>),
+    (frequency, frequencies): (f64, &Frequencies),
+    SearchSettings { draws, seed }: SearchSettings,
+) -> Option<NightOffsets> {
+    let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter, Reach::Any)?;
+    let height = all.orbit_at(frequency)?.delta_ln_l;
+    let alarm = FalseAlarm::draw(&all, &frequencies.per_cycle, DRAWS.min(draws), seed);
+    Some(NightOffsets { sigma_kms, gain, false_alarm_probability: alarm.probability(height).value() })
+}
+
+/// The same of a known planet, its velocities for a K of 1.
 pub fn known_beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
     jitter: (f64, Option<f64>),
     unit: &DVector<f64>,
-    settings: SearchSettings,
+    SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
-    let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter)?;
-    let height = all.height_above_zero(unit);
-    let drawn = amplitudes(&all, unit, settings.draws, settings.seed);
-    let above = drawn.into_iter().filter(|drawn| *drawn >= height).count();
-    let false_alarm_probability = (1 + above) as f64 / (1 + settings.draws) as f64;
-    Some(NightOffsets { sigma_kms, gain, false_alarm_probability, without_offsets: None })
+    let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter, Reach::Any)?;
+    let (height, draws) = (all.height_above_zero(unit), DRAWS.min(draws));
+    let above = amplitudes(&all, unit, draws, seed).into_iter().filter(|drawn| *drawn >= height).count();
+    Some(NightOffsets { sigma_kms, gain, false_alarm_probability: (1 + above) as f64 / (1 + draws) as f64 })
+}
+
+impl Reach {
+    /// Those of the `sizes` (km/s) that are within it, and the largest, where some are beyond.
+    pub(super) fn of(self, sizes: &[f64], scale_kms: Option<f64>) -> Vec<f64> {
+        let most_kms = match self {
+            Reach::Stable => MOST * scale_kms.unwrap_or(USUAL_KMS),
+            Reach::Any => f64::INFINITY,
+        };
+        let mut within: Vec<f64> = sizes.iter().map(|size| size.min(most_kms)).collect();
+        within.dedup();
+        within
+    }
+
+    /// ln of the prior of an offset (km/s) beside that of none.
+    fn ln_prior(self, night_kms: f64, scale_kms: Option<f64>) -> f64 {
+        match self {
+            Reach::Stable => 0.0,
+            Reach::Any => ln_prior(night_kms, scale_kms.or(Some(USUAL_KMS))),
+        }
+    }
 }
 
 /// Sizes of a jitter that is `found_kms` without offsets.
@@ -183,7 +231,7 @@ impl Beside {
         without: &VelocityQuadratic,
         Nights(of_night): &Nights,
         scatter: Scatter,
-        scale_kms: Option<f64>,
+        (scale_kms, reach): (Option<f64>, Reach),
     ) -> Option<Self> {
         let Scatter { jitter_kms, night_kms } = scatter;
         let n = without.len();
@@ -196,7 +244,7 @@ impl Beside {
         let inner = DMatrix::identity(jitter + nights, jitter + nights) + 0.5 * (&inner + inner.transpose());
         let factor = inner.cholesky()?.unpack();
         let solved = factor.solve_lower_triangular(&columns.transpose())?;
-        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior_of_offsets(night_kms, scale_kms.unwrap_or(USUAL_KMS));
+        let prior = ln_prior(jitter_kms, scale_kms) + reach.ln_prior(night_kms, scale_kms);
         let constant = prior - factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let height = constant + 0.5 * (&solved * &without.gradient).norm_squared();
         Some(Beside { columns, solved, constant, height })
@@ -225,12 +273,6 @@ impl Beside {
             rotation: &self.solved * root,
         }
     }
-}
-
-/// ln of the prior of offsets (km/s) beside that of none: of the scatter of a spectrograph, half-Gaussian. That of a
-/// jitter falls off too slowly here: planets would pass for offsets of several times what spectrographs have.
-fn ln_prior_of_offsets(night_kms: f64, scale_kms: f64) -> f64 {
-    -0.5 * (night_kms / scale_kms).powi(2)
 }
 
 /// The likelihood beside `all` of these, stars without a planet being those of `null`.

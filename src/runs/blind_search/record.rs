@@ -327,7 +327,7 @@ pub struct RobustnessRecord {
     /// The sum over them of what the planet adds to their prediction; null for less than two nights.
     #[serde(default)]
     pub held_out_nights: Option<HeldOut>,
-    /// RV offsets of nights beside which the highest peak is judged; absent where none are likely.
+    /// What RV offsets of nights, larger than the search counts, make of the highest peak, if it is a candidate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_offsets: Option<NightOffsets>,
 }

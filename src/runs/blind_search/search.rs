@@ -94,7 +94,7 @@ impl<'a> BlindSearch<'a> {
         let first = detection.known.first();
         let robustness = is_tried.then(|| try_out(first.map_or(Tried::Peak(&detection.best), Tried::Known)));
         let compares = options.robustness != RobustnessOf::None;
-        let night_offsets = compares.then(|| detection.night_offsets(settings.search)).flatten();
+        let night_offsets = compares.then(|| detection.peak_beside_nights(settings.search)).flatten();
         let of_known = |planet| compares.then(|| detection.known_beside_nights(planet, settings.search));
         let known_night_offsets: Vec<_> = detection.known.planets.iter().map(|of| of_known(of).flatten()).collect();
         let surface = settings.surface.model();

@@ -25,7 +25,7 @@ fn found(jitter_kms: f64, night_kms: f64, k_kms: f64, seed: u64) -> Option<(f64,
     let (velocities, nights) = of(jitter_kms, night_kms, k_kms, seed);
     let frequencies = Frequencies::new(&velocities.cycles, 1.0, FrequencySettings::default()).unwrap();
     let found_kms = jitter_kms.hypot(night_kms).hypot(k_kms / std::f64::consts::SQRT_2);
-    let (all, offsets) = beside_offsets(&velocities, &nights, (found_kms, None))?;
+    let (all, offsets) = beside_offsets(&velocities, &nights, (found_kms, None), Reach::Stable)?;
     let search = Search::with_jitter(&all, &frequencies, SearchSettings { draws: 1000, seed: 1 }).unwrap();
     Some((search.false_alarm.probability(search.best().orbit.delta_ln_l).value(), offsets))
 }
@@ -46,12 +46,12 @@ fn the_offsets_add_to_the_covariance() {
     let alone = density(Scatter { jitter_kms: 0.0, night_kms: 0.0 }).0;
     let all = scatters(&[0.0, 0.02], &[0.0, 0.07]);
     assert_eq!(all.len(), 4);
-    let beside = |scatter: &Scatter| Beside::new(&velocities, &nights, *scatter, None).unwrap();
+    let beside = |scatter: &Scatter| Beside::new(&velocities, &nights, *scatter, (None, Reach::Any)).unwrap();
     let jitters = of_scatters(&velocities, &beside(&all[2]), &all.iter().map(beside).collect::<Vec<_>>());
     let null = density(all[2]).2;
     for (scatter, level) in all.iter().zip(jitters.levels()) {
         let (ln_l, inverse, _) = density(*scatter);
-        let above = ln_l - alone + ln_prior_of_offsets(scatter.night_kms, USUAL_KMS);
+        let above = ln_l - alone + ln_prior(scatter.night_kms, Some(USUAL_KMS));
         assert!((beside(scatter).height - above).abs() < 1e-8, "{scatter:?}");
         assert!((&level.quadratic.information - &inverse).norm() < 1e-8 * inverse.norm(), "{scatter:?}");
         assert!((&level.quadratic.gradient - &inverse * &rv).norm() < 1e-8 * (&inverse * &rv).norm(), "{scatter:?}");
@@ -71,7 +71,7 @@ fn offsets_of_nights_are_no_planet() {
     let distance = all.iter().enumerate().map(apart).fold(0.0, f64::max);
     // exceeded once in a hundred by chance: 1.63 / sqrt(60)
     assert!(all.len() > 58 && distance < 0.21 && all[0] > 1e-3, "{distance} {all:?}");
-    // the prior of 30 m/s makes them smaller
+    // no more than 60 m/s count
     let sizes = found.iter().map(|found| found.1.sigma_kms.powi(2)).sum::<f64>() / found.len() as f64;
     assert!((0.65..1.05).contains(&(sizes.sqrt() / 0.06)), "{sizes}");
 }
