@@ -22,6 +22,8 @@ pub struct FalseAlarm {
     pub maxima: Vec<f64>,
     /// The form of the tail.
     pub tail: Tail,
+    /// RV offset of a night of these stars: its standard deviation (km/s).
+    pub night_kms: f64,
 }
 
 /// `1 - exp(-tau)`.
@@ -111,7 +113,7 @@ impl FalseAlarm {
         let mut maxima = maxima(jitters, frequencies, draws, seed);
         maxima.sort_by(f64::total_cmp);
         let tail = if jitters.is_none() { Tail::fit(&maxima, 1.0) } else { Tail::fit_with_rate(&maxima) };
-        FalseAlarm { maxima, tail }
+        FalseAlarm { maxima, tail, night_kms: jitters.night_kms }
     }
 
     /// Probability that a star without a planet shows a peak of at least `z`.

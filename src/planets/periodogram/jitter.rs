@@ -34,6 +34,8 @@ pub struct Jitters {
     pub(super) levels: Vec<Level>,
     /// ln of the share of each of a prior that is uniform up to the largest.
     pub(super) ln_shares: Vec<f64>,
+    /// RV offset of a night of stars without a planet: its standard deviation (km/s).
+    pub(super) night_kms: f64,
 }
 
 /// One size.
@@ -82,7 +84,7 @@ impl Jitters {
             squares: DVector::zeros(0),
             rotation: DMatrix::zeros(0, 0),
         };
-        Jitters { levels: vec![level], ln_shares: vec![0.0] }
+        Jitters { levels: vec![level], ln_shares: vec![0.0], night_kms: 0.0 }
     }
 
     /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet, with the
@@ -115,7 +117,7 @@ impl Jitters {
         let mut levels = SIZES.map(level).to_vec();
         let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
         levels.iter_mut().for_each(|level| level.ln_l -= best);
-        Jitters { levels, ln_shares: ln_shares(&SIZES) }
+        Jitters { levels, ln_shares: ln_shares(&SIZES), night_kms: 0.0 }
     }
 
     /// ln L of no planet with each size, times its share of a prior that is uniform up to the largest.

@@ -144,7 +144,7 @@ pub(super) fn beside(
     let found = of_scatters(without, &of(null)?, &all?);
     let shares =
         ln_shares(&offsets).into_iter().flat_map(|night| ln_shares(&jitters).into_iter().map(move |s| s + night));
-    Some(Jitters { ln_shares: shares.collect(), ..found })
+    Some(Jitters { ln_shares: shares.collect(), night_kms: null.night_kms, ..found })
 }
 
 /// What offsets of nights, of any size, make of the highest peak, at one of the frequencies (orbits a rotation cycle).
@@ -281,7 +281,7 @@ fn of_scatters(without: &VelocityQuadratic, null: &Beside, all: &[Beside]) -> Ji
     let root = root(&(&without.information + &moved * moved.transpose()));
     let best = all.iter().map(|beside| beside.height).fold(f64::NEG_INFINITY, f64::max);
     let levels = all.iter().map(|beside| beside.level(without, &root, best)).collect();
-    Jitters { levels, ln_shares: Vec::new() }
+    Jitters { levels, ln_shares: Vec::new(), night_kms: 0.0 }
 }
 
 #[cfg(test)]

@@ -298,6 +298,9 @@ pub struct FalseAlarmRecord {
     pub used: String,
     /// Number of draws.
     pub draws: usize,
+    /// RV offset of a night of these stars: its standard deviation (km/s).
+    #[serde(default)]
+    pub night_offsets_kms: f64,
     /// Effective bandwidth of the search (Baluev 2008).
     #[serde(deserialize_with = "number_or_null")]
     pub w: f64,
@@ -523,6 +526,7 @@ impl FalseAlarmRecord {
             by_extreme_value: found.by_tail,
             used: if found.draws_suffice { "draws" } else { "extreme value" }.into(),
             draws: alarm.maxima.len(),
+            night_offsets_kms: alarm.night_kms,
             w: alarm.tail.w,
             independent_periods: alarm.independent_periods(),
             levels: LEVELS.map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) }),

@@ -221,8 +221,12 @@ fn without_nights(nights: &[NightRecord]) -> String {
 fn chance(alarm: &FalseAlarmRecord) -> String {
     let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
+    let offsets = match 1000.0 * alarm.night_offsets_kms {
+        0.0 => String::new(),
+        ms => format!(", RV offsets of nights {ms:.0} m/s"),
+    };
     format!(
-        "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations, N_ind ≈ {independent_periods:.0})\n\
+        "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations{offsets}, N_ind ≈ {independent_periods:.0})\n\
         Thresholds at FAP = 10, 1, 0.1 %: {}",
         false_alarm(*p),
         levels.join(", ")

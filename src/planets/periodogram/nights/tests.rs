@@ -61,16 +61,16 @@ fn the_offsets_add_to_the_covariance() {
     }
 }
 
-/// The highest peak is judged beside offsets of their true size: probabilities are uniform.
+/// Stars without a planet are drawn with the offsets found beside the peak: probabilities are uniform or larger.
 #[test]
 fn offsets_of_nights_are_no_planet() {
     let found: Vec<(f64, Offsets)> = (0..60).filter_map(|seed| found(0.0, 0.06, 0.0, seed)).collect();
     let mut all: Vec<f64> = found.iter().map(|found| found.0).collect();
     all.sort_by(f64::total_cmp);
-    let apart = |(k, p): (usize, &f64)| ((k as f64 + 0.5) / all.len() as f64 - p).abs();
-    let distance = all.iter().enumerate().map(apart).fold(0.0, f64::max);
-    // exceeded once in a hundred by chance: 1.63 / sqrt(60)
-    assert!(all.len() > 58 && distance < 0.21 && all[0] > 1e-3, "{distance} {all:?}");
+    let below = |(k, p): (usize, &f64)| (k as f64 + 0.5) / all.len() as f64 - p;
+    let distance = all.iter().enumerate().map(below).fold(0.0, f64::max);
+    // exceeded once in a hundred by chance: 1.52 / sqrt(60)
+    assert!(all.len() > 58 && distance < 0.2 && all[0] > 1e-3 && all[30] < 0.8, "{distance} {all:?}");
     // no more than 60 m/s count
     let sizes = found.iter().map(|found| found.1.sigma_kms.powi(2)).sum::<f64>() / found.len() as f64;
     assert!((0.65..1.05).contains(&(sizes.sqrt() / 0.06)), "{sizes}");
