@@ -94,8 +94,8 @@ const EVEN: f64 = 0.1;
 const TOLD: usize = 5;
 
 /// Marginal likelihoods of the models, over that of no planet. Every model, that of no planet among them, is integrated
-/// over the same prior of the velocity jitter, uniform up to the largest of `jitters`: what the jitter without a planet
-/// takes up counts for no planet alone. `None` where the velocities do not bound an orbit.
+/// over the same prior of the velocity jitter and of offsets of nights, uniform up to the largest of `jitters`: what
+/// these take up without a planet counts for no planet alone. `None` where the velocities do not bound an orbit.
 pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
     let weights = jitters.ln_weights();
     let alone = ln_sum(&weights);

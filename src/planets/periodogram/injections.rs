@@ -1,11 +1,12 @@
-//! Orbits put into the velocities of a star, and the highest peak of each, beside a jitter of unknown size and
-//! spots of an unknown field.
+//! Orbits put into the velocities of a star, and the highest peak of each, beside a jitter and offsets of nights of
+//! unknown size and spots of an unknown field.
 //!
 //! An orbit adds `I V` to the gradient and changes nothing else, so that the whitened gradient at every trial period
 //! and for every size of the jitter is linear in the orbit's two amplitudes: three products a period, and each orbit
 //! of that period is a sum. A jitter that hides an orbit grows with it, so sizes reach from none to that of the largest
-//! orbit. Spots that hide an orbit are of another field, shorter-lived: a search takes the field that suits the star
-//! best with the orbit in its velocities and no planet in the model, which lies between the fields that are given.
+//! orbit, those of offsets to the most that count. Spots that hide an orbit are of another field, shorter-lived: a
+//! search takes the field that suits the star best with the orbit in its velocities and no planet in the model, which
+//! lies between the fields that are given.
 
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
