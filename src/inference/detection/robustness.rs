@@ -175,7 +175,9 @@ impl Detection {
         let star = self.without_jitter.as_ref().filter(|_| self.is_candidate())?;
         let velocities = self.known.beside(&star.here.quadratic);
         let (peak, jitter) = (1.0 / self.blind.best().porb_over_prot, (star.found_kms, star.scale_kms));
-        peak_beside_offsets(&velocities, star.nights.as_ref()?, jitter, (peak, &self.frequencies), settings)
+        let found =
+            peak_beside_offsets(&velocities, star.nights.as_ref()?, jitter, (peak, &self.frequencies), settings)?;
+        Some(found).filter(|found| found.sigma_kms > self.blind.false_alarm.night_kms)
     }
 
     /// The same of a known planet that would be one: as its significance, by the star without it.

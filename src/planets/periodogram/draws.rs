@@ -30,7 +30,7 @@ pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -
 pub fn amplitudes(jitters: &Jitters, unit: &DVector<f64>, draws: usize, seed: u64) -> Vec<f64> {
     let row = |level: &Level| {
         let information = unit.dot(&(&level.quadratic.information * unit));
-        let row = level.root.tr_mul(unit) / information.sqrt();
+        let row = &level.root * unit / information.sqrt();
         DMatrix::from_row_slice(1, row.len(), row.as_slice())
     };
     heights(jitters, &row, above_zero, draws, seed)

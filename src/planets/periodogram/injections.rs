@@ -20,9 +20,11 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Sizes of the jitter grow by this factor; beside offsets of nights, these and the jitter by the other.
+/// Sizes of the jitter grow by this factor.
 const STEP: f64 = std::f64::consts::SQRT_2;
-const STEP_BESIDE_OFFSETS: f64 = 2.0;
+
+/// Those of offsets of nights by this one.
+const STEP_OF_OFFSETS: f64 = 2.0;
 
 /// The smallest one, of the standard error of a velocity.
 const SMALLEST: f64 = 0.35;
@@ -148,7 +150,8 @@ impl<'a> Injections<'a> {
         *once::found(&size.level, || {
             let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
             let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
-            let jitter = (jitter_kms, field.scale_kms);
+            // without offsets a jitter stands in for them
+            let jitter = (jitter_kms.hypot(night_kms), field.scale_kms);
             let of_offsets = || beside(velocities, &field.nights, size.scatter, jitter, Reach::Stable);
             let jitters = match (jitter_kms > 0.0, night_kms > 0.0) {
                 (false, false) => Jitters::none(velocities),
@@ -165,21 +168,22 @@ impl<'a> Field<'a> {
     fn new(star: &'a OfField, jitter: &Jitter, most_kms: f64, frequencies: &Frequencies) -> Self {
         let velocities = &star.velocities;
         let error_kms = (velocities.len() as f64 / velocities.information.trace()).sqrt();
-        let sizes = |step: f64| {
+        let sizes = |step: f64, most_kms: f64| {
             let (mut kms, mut next) = (vec![0.0], SMALLEST * error_kms);
-            while next < step * most_kms.max(error_kms) {
+            while next < step * most_kms {
                 kms.push(next);
                 next *= step;
             }
             kms
         };
+        let most_kms = most_kms.max(error_kms);
         let (scale_kms, nights, scatters) = match jitter {
             Jitter::Known => (None, None, scatters(&[0.0], &[0.0])),
-            Jitter::Fitted(scale_kms, None) => (*scale_kms, None, scatters(&sizes(STEP), &[0.0])),
+            Jitter::Fitted(scale_kms, None) => (*scale_kms, None, scatters(&sizes(STEP, most_kms), &[0.0])),
             Jitter::Fitted(scale_kms, nights) => {
-                let sizes = sizes(STEP_BESIDE_OFFSETS);
-                let offsets = Reach::Stable.of(&sizes, *scale_kms);
-                (*scale_kms, nights.clone(), scatters(&sizes, &offsets))
+                let offsets = sizes(STEP_OF_OFFSETS, Reach::Stable.most_kms(*scale_kms));
+                let offsets = Reach::Stable.of(&offsets, *scale_kms);
+                (*scale_kms, nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
             }
         };
         let nights = nights.unwrap_or_else(|| Nights::none(velocities.len()));
@@ -290,7 +294,11 @@ impl Column<'_, '_> {
         let (of, field) = (&self.fields[field], &self.all.fields[field]);
         let alone = field.alone(of, ab);
         let best_alone = largest(&alone)?;
-        let whitened: Vec<DVector<f64>> = of.whitened.iter().map(|parts| sum(parts, ab)).collect();
+        // as a search: where without a planet no offsets suit best, none are tried
+        let has_offsets = |size: usize| field.sizes[size].scatter.night_kms > 0.0;
+        let is_tried = |size: &usize| has_offsets(best_alone) || !has_offsets(*size);
+        let of_orbit = |size: usize| if is_tried(&size) { sum(&of.whitened[size], ab) } else { DVector::zeros(0) };
+        let whitened: Vec<DVector<f64>> = (0..alone.len()).map(of_orbit).collect();
         let height = |size: usize, trial: usize| {
             let amplitudes = whitened[size].as_slice();
             0.5 * (amplitudes[2 * trial].powi(2) + amplitudes[2 * trial + 1].powi(2))
@@ -298,12 +306,7 @@ impl Column<'_, '_> {
         let bounded = |size: usize, trial: usize| field.sizes[size].factors[trial] != UNBOUNDED;
         let frequencies = &self.all.frequencies.per_cycle;
         let of_size = |size: usize| (0..frequencies.len()).map(move |trial| (size, trial));
-        // as a search: where without a planet no offsets suit best, none are tried
-        let has_offsets = |size: usize| field.sizes[size].scatter.night_kms > 0.0;
-        let all = (0..alone.len())
-            .filter(|&size| has_offsets(best_alone) || !has_offsets(size))
-            .flat_map(of_size)
-            .filter(|&(size, trial)| bounded(size, trial));
+        let all = (0..alone.len()).filter(is_tried).flat_map(of_size).filter(|&(size, trial)| bounded(size, trial));
         let total = |&(size, trial): &(usize, usize)| alone[size] + height(size, trial);
         let best @ (size, trial) = all.max_by(|a, b| total(a).total_cmp(&total(b)))?;
         let [a, b] = [whitened[size][2 * trial], whitened[size][2 * trial + 1]];
@@ -326,9 +329,11 @@ impl Field<'_> {
         self.sizes.iter().zip(&of.along).map(|(size, along)| size.constant + sum(along, ab).norm_squared()).collect()
     }
 
-    /// What a fit without a planet maximises, where (a, b) is in the velocities.
+    /// What a fit without a planet, and without offsets of nights, maximises, where (a, b) is in the velocities.
     fn ln_posterior(&self, of: &OfPeriod, ab: Vector2<f64>) -> f64 {
-        let of_jitter = self.alone(of, ab).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let alone = self.alone(of, ab).into_iter().zip(&self.sizes);
+        let of_jitter = alone.filter(|(_, size)| size.scatter.night_kms == 0.0).map(|(ln_l, _)| ln_l);
+        let of_jitter = of_jitter.fold(f64::NEG_INFINITY, f64::max);
         self.star.ln_posterior - of.gradient.dot(&ab) - 0.5 * ab.dot(&(of.information * ab)) + of_jitter
     }
 }

@@ -176,12 +176,17 @@ pub fn known_beside_offsets(
 }
 
 impl Reach {
-    /// Those of the `sizes` (km/s) that are within it, and the largest, where some are beyond.
-    pub(super) fn of(self, sizes: &[f64], scale_kms: Option<f64>) -> Vec<f64> {
-        let most_kms = match self {
+    /// The largest (km/s).
+    pub(super) fn most_kms(self, scale_kms: Option<f64>) -> f64 {
+        match self {
             Reach::Stable => MOST * scale_kms.unwrap_or(USUAL_KMS),
             Reach::Any => f64::INFINITY,
-        };
+        }
+    }
+
+    /// Those of the `sizes` (km/s) that are within it, and the largest, where some are beyond.
+    pub(super) fn of(self, sizes: &[f64], scale_kms: Option<f64>) -> Vec<f64> {
+        let most_kms = self.most_kms(scale_kms);
         let mut within: Vec<f64> = sizes.iter().map(|size| size.min(most_kms)).collect();
         within.dedup();
         within

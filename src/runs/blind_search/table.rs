@@ -221,9 +221,9 @@ fn without_nights(nights: &[NightRecord]) -> String {
 fn chance(alarm: &FalseAlarmRecord) -> String {
     let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
-    let offsets = match 1000.0 * alarm.night_offsets_kms {
-        0.0 => String::new(),
-        ms => format!(", RV offsets of nights {ms:.0} m/s"),
+    let offsets = match alarm.night_offsets_kms {
+        kms if kms > 0.0 => format!(", RV offsets of nights {:.0} m/s", 1000.0 * kms),
+        _ => String::new(),
     };
     format!(
         "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations{offsets}, N_ind ≈ {independent_periods:.0})\n\
