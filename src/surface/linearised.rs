@@ -5,7 +5,7 @@ use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
-use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets};
+use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
@@ -63,15 +63,18 @@ pub struct WithoutJitter {
 }
 
 impl WithoutJitter {
-    /// The likelihood of these velocities of this star, of all profiles or of some in their order, beside jitters and
-    /// offsets of nights of several sizes.
+    /// The likelihood of these velocities of this star beside jitters and offsets of nights of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        let beside = |nights: &Nights| {
-            let nights = nights.of(&quadratic.cycles, &self.here.quadratic.cycles);
-            beside_offsets(quadratic, &nights, (self.found_kms, self.scale_kms), Reach::Stable)
-        };
-        let offsets = self.nights.as_ref().and_then(beside);
-        offsets.map_or_else(|| self.beside_jitter(quadratic), |(all, _)| all)
+        let jitter = (self.found_kms, self.scale_kms);
+        let beside = |nights: &Nights| Some(beside_offsets(quadratic, nights, jitter, Reach::Stable)?.0);
+        self.nights.as_ref().and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
+    }
+
+    /// The same of some of the profiles, in their order, beside what is likely in `of_all`.
+    pub fn of_some_beside(&self, quadratic: &VelocityQuadratic, of_all: &Jitters) -> Jitters {
+        let nights = self.nights.as_ref().map(|nights| nights.of(&quadratic.cycles, &self.here.quadratic.cycles));
+        let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, (self.found_kms, self.scale_kms));
+        nights.and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
     /// Beside jitters of several sizes alone.

@@ -129,26 +129,30 @@ pub fn robustness(
     let without = surface.without_each(at, found.last(), &nights, &orbit);
     // Delta ln L is that of the blind search: around a star without a planet, beside the jitter that is found there
     let alone = At { values: alone, ..at };
-    let jitters = |quadratic: &VelocityQuadratic| match (&found.without_jitter, tried) {
-        (Some(star), Tried::Peak(_)) => star.beside(quadratic),
+    let star = found.without_jitter.as_ref().map_or(&found.planet_free, |without| &without.here);
+    let of_all = &*match tried {
+        Tried::Peak(_) => found.known.beside(&star.quadratic),
+        Tried::Known(planet) => found.known.beside_others(planet, &star.quadratic),
+    };
+    let of_all = match (&found.without_jitter, tried) {
+        (Some(star), Tried::Peak(_)) => star.beside(of_all),
         // what offsets of nights make of it is said beside
-        (Some(star), Tried::Known(_)) => star.beside_jitter(quadratic),
-        (None, _) => Jitters::none(quadratic),
+        (Some(star), Tried::Known(_)) => star.beside_jitter(of_all),
+        (None, _) => Jitters::none(of_all),
+    };
+    let jitters = |quadratic: &VelocityQuadratic| match &found.without_jitter {
+        Some(star) => star.of_some_beside(quadratic, &of_all),
+        None => Jitters::none(quadratic),
     };
     let blind = |quadratic: &VelocityQuadratic| match &found.without_jitter {
         Some(_) => tried.beside(found, quadratic, &jitters),
         None => orbit(quadratic),
     };
-    let star = found.without_jitter.as_ref().map_or(&found.planet_free, |without| &without.here);
     let heights = surface.at_other_targets(alone, &blind).into_iter().map(|at| at.orbit);
     let targets = targets.into_iter().zip(heights);
     let targets = targets.map(|(at, blind)| AtTarget { orbit: with_height(at.orbit, blind), ..at }).collect();
     let heights = surface.without_each(alone, star, &nights, &blind);
     // ln p of a night given all others is the difference of two heights of one orbit
-    let of_all = jitters(&*match tried {
-        Tried::Peak(_) => found.known.beside(&star.quadratic),
-        Tried::Known(planet) => found.known.beside_others(planet, &star.quadratic),
-    });
     let held_out = |of_others: Fitted| {
         let orbit = of_others?;
         Some(of_all.delta_ln_l(&tried.velocities(&orbit, &star.quadratic.cycles)) - orbit.delta_ln_l)

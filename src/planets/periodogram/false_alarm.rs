@@ -113,7 +113,7 @@ impl FalseAlarm {
         let mut maxima = maxima(jitters, frequencies, draws, seed);
         maxima.sort_by(f64::total_cmp);
         let tail = if jitters.is_none() { Tail::fit(&maxima, 1.0) } else { Tail::fit_with_rate(&maxima) };
-        FalseAlarm { maxima, tail, night_kms: jitters.night_kms }
+        FalseAlarm { maxima, tail, night_kms: jitters.null.map_or(0.0, |null| null.night_kms) }
     }
 
     /// Probability that a star without a planet shows a peak of at least `z`.

@@ -10,8 +10,8 @@
 
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
-use super::jitter::Jitters;
-use super::nights::{Beside, Nights, Reach, Scatter, beside, scatters};
+use super::jitter::{Jitters, Scatter};
+use super::nights::{Beside, Nights, Reach, beside, scatters};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::numerics::once;

@@ -28,14 +28,21 @@ pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
     if last == 0 { vec![0.0] } else { (0..=last).map(|k| share(k).ln()).collect() }
 }
 
+/// Standard deviations (km/s) of jitter and offsets of nights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scatter {
+    pub jitter_kms: f64,
+    pub night_kms: f64,
+}
+
 /// ln L of the velocities beside jitters of several sizes, and offsets of nights (`nights`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jitters {
     pub(super) levels: Vec<Level>,
     /// ln of the share of each of a prior that is uniform up to the largest.
     pub(super) ln_shares: Vec<f64>,
-    /// RV offset of a night of stars without a planet: its standard deviation (km/s).
-    pub(super) night_kms: f64,
+    /// What stars without a planet have, where offsets of nights are among it.
+    pub(super) null: Option<Scatter>,
 }
 
 /// One size.
@@ -84,7 +91,7 @@ impl Jitters {
             squares: DVector::zeros(0),
             rotation: DMatrix::zeros(0, 0),
         };
-        Jitters { levels: vec![level], ln_shares: vec![0.0], night_kms: 0.0 }
+        Jitters { levels: vec![level], ln_shares: vec![0.0], null: None }
     }
 
     /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet, with the
@@ -117,7 +124,7 @@ impl Jitters {
         let mut levels = SIZES.map(level).to_vec();
         let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
         levels.iter_mut().for_each(|level| level.ln_l -= best);
-        Jitters { levels, ln_shares: ln_shares(&SIZES), night_kms: 0.0 }
+        Jitters { levels, ln_shares: ln_shares(&SIZES), null: None }
     }
 
     /// ln L of no planet with each size, times its share of a prior that is uniform up to the largest.

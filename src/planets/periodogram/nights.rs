@@ -8,7 +8,7 @@
 //! without a planet have those that are the most likely without one.
 
 use super::draws::amplitudes;
-use super::jitter::{Jitters, Level, ln_prior, ln_shares, root};
+use super::jitter::{Jitters, Level, Scatter, ln_prior, ln_shares, root};
 use super::{FalseAlarm, Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
@@ -98,8 +98,8 @@ pub struct Offsets {
 }
 
 /// The likelihood of the velocities beside a jitter, which is `found_kms` in a star without a planet and has a prior of
-/// that scale, the stability of the spectrograph, and offsets of `nights` within that `reach`. `None` where without a
-/// planet none are more likely than any.
+/// that scale, the stability of the spectrograph, and offsets of `nights` within that `reach`. `None` where none are the
+/// most likely without a planet.
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -130,6 +130,16 @@ pub fn beside_offsets(
     if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
 }
 
+/// The same as beside offsets where these were sought: in `of_all` profiles, of which these are some.
+pub fn beside_offsets_of(
+    of_all: &Jitters,
+    without: &VelocityQuadratic,
+    nights: &Nights,
+    jitter: (f64, Option<f64>),
+) -> Option<Jitters> {
+    beside(without, nights, of_all.null?, jitter, Reach::Stable)
+}
+
 /// The same where `null` is the scatter of stars without a planet, and the jitter up to `found_kms`.
 pub(super) fn beside(
     without: &VelocityQuadratic,
@@ -141,10 +151,9 @@ pub(super) fn beside(
     let (jitters, offsets) = (jitters(found_kms), reach.of(&PARTS.map(|part| part * null.night_kms), scale_kms));
     let of = |one: Scatter| Beside::new(without, nights, one, (scale_kms, reach));
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
-    let found = of_scatters(without, &of(null)?, &all?);
-    let shares =
-        ln_shares(&offsets).into_iter().flat_map(|night| ln_shares(&jitters).into_iter().map(move |s| s + night));
-    Some(Jitters { ln_shares: shares.collect(), night_kms: null.night_kms, ..found })
+    let of_jitter = ln_shares(&jitters);
+    let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
+    Some(Jitters { levels: levels(without, &of(null)?, &all?), ln_shares: shares.collect(), null: Some(null) })
 }
 
 /// What offsets of nights, of any size, make of the highest peak, at one of the frequencies (orbits a rotation cycle).
@@ -204,13 +213,6 @@ impl Reach {
 /// Sizes of a jitter that is `found_kms` without offsets.
 fn jitters(found_kms: f64) -> Vec<f64> {
     if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] }
-}
-
-/// Standard deviations of jitter and offsets.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scatter {
-    pub jitter_kms: f64,
-    pub night_kms: f64,
 }
 
 /// Each of the jitters with each of the offsets.
@@ -281,12 +283,11 @@ impl Beside {
 }
 
 /// The likelihood beside `all` of these, stars without a planet being those of `null`.
-fn of_scatters(without: &VelocityQuadratic, null: &Beside, all: &[Beside]) -> Jitters {
+fn levels(without: &VelocityQuadratic, null: &Beside, all: &[Beside]) -> Vec<Level> {
     let moved = &without.information * &null.columns;
     let root = root(&(&without.information + &moved * moved.transpose()));
     let best = all.iter().map(|beside| beside.height).fold(f64::NEG_INFINITY, f64::max);
-    let levels = all.iter().map(|beside| beside.level(without, &root, best)).collect();
-    Jitters { levels, ln_shares: Vec::new(), night_kms: 0.0 }
+    all.iter().map(|beside| beside.level(without, &root, best)).collect()
 }
 
 #[cfg(test)]

@@ -83,3 +83,20 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
         }
     }
 }
+
+/// The fit of spots knows no offsets of nights: they do not change which field is searched with.
+#[test]
+fn fields_are_fitted_without_offsets_of_nights() {
+    let cycles = uneven(20, 5.0);
+    let quadratic = sample::independent(&cycles, &DVector::zeros(20), &DVector::from_element(20, 0.05));
+    let stars = [OfField { held: quadratic.clone(), velocities: quadratic, ln_posterior: 0.0 }];
+    let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
+    let settings = SearchSettings { draws: 1000, seed: 1 };
+    let pairs: Vec<Vec<usize>> = (0..10).map(|night| vec![2 * night, 2 * night + 1]).collect();
+    let heights = [None, Nights::new(20, &pairs)].map(|nights| {
+        let fitted = Jitter::Fitted(None, nights);
+        let injections = Injections::new(&stars, &fitted, 0.6, &frequencies, settings, 0.01);
+        injections.column(1.7).ln_posteriors(amplitudes(&cycles, 1.0 / 1.7, 0.3, 0.4))[0]
+    });
+    assert!((heights[0] - heights[1]).abs() < 1e-9, "{heights:?}");
+}

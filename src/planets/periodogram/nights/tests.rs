@@ -47,9 +47,9 @@ fn the_offsets_add_to_the_covariance() {
     let all = scatters(&[0.0, 0.02], &[0.0, 0.07]);
     assert_eq!(all.len(), 4);
     let beside = |scatter: &Scatter| Beside::new(&velocities, &nights, *scatter, (None, Reach::Any)).unwrap();
-    let jitters = of_scatters(&velocities, &beside(&all[2]), &all.iter().map(beside).collect::<Vec<_>>());
+    let levels = levels(&velocities, &beside(&all[2]), &all.iter().map(beside).collect::<Vec<_>>());
     let null = density(all[2]).2;
-    for (scatter, level) in all.iter().zip(jitters.levels()) {
+    for (scatter, level) in all.iter().zip(levels) {
         let (ln_l, inverse, _) = density(*scatter);
         let above = ln_l - alone + ln_prior(scatter.night_kms, Some(USUAL_KMS));
         assert!((beside(scatter).height - above).abs() < 1e-8, "{scatter:?}");
@@ -126,4 +126,29 @@ fn profiles_that_are_left_keep_their_nights() {
     let of = [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
     assert_eq!(left.0, DMatrix::from_fn(4, 3, |row, night| of[row][night]));
     assert_eq!(Nights::new(5, &[vec![0, 1], vec![2], vec![3, 4]]), None);
+}
+
+/// K of a known planet is drawn with the variance of its gradient: nights of unlike size and correlated errors, whose
+/// root is not symmetric.
+#[test]
+fn amplitudes_have_the_variance_of_the_gradient() {
+    let cycles: Vec<f64> = (0..12).map(|k| 0.37 * f64::from(k / 3) + 0.03 * f64::from(k % 3)).collect();
+    let velocities = sample::correlated(&cycles, &DVector::zeros(12), 5);
+    let nights = Nights::new(12, &[(0..2).collect(), (2..9).collect(), (9..12).collect()]).unwrap();
+    let of = |night_kms| {
+        let scatter = Scatter { jitter_kms: 0.0, night_kms };
+        Beside::new(&velocities, &nights, scatter, (None, Reach::Any)).unwrap()
+    };
+    let levels = levels(&velocities, &of(0.3), &[of(0.15)]);
+    let of_level = &levels[0].quadratic.information;
+    let unit = sample::orbit(&cycles, 1.0, 1.7, 0.3);
+    let nights_kms2 = &nights.0 * nights.0.transpose() * 0.09;
+    let covariance = velocities.information.clone().try_inverse().unwrap() + nights_kms2;
+    let pulled = of_level * &unit;
+    let expected = pulled.dot(&(&covariance * &pulled)) / unit.dot(&pulled);
+    let jitters = Jitters { levels, ln_shares: vec![0.0], null: None };
+    // half of the amplitudes are above zero, where Delta ln L is half of their square
+    let drawn = amplitudes(&jitters, &unit, 20_000, 1);
+    let variance = 4.0 * drawn.iter().sum::<f64>() / drawn.len() as f64;
+    assert!((variance / expected - 1.0).abs() < 0.06, "{variance} {expected}");
 }
