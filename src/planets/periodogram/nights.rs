@@ -98,8 +98,8 @@ pub struct Offsets {
 }
 
 /// The likelihood of the velocities beside a jitter, which is `found_kms` in a star without a planet and has a prior of
-/// that scale, the stability of the spectrograph, and offsets of `nights` within that `reach`. `None` where none are the
-/// most likely without a planet.
+/// that scale, the stability of the spectrograph, and offsets of `nights` within that `reach`. `None` where none are
+/// the most likely without a planet.
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
