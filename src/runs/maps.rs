@@ -77,6 +77,9 @@ impl<'a> Maps<'a> {
         let diagnosis = suspicious.then(|| diagnosis(scene)).flatten().filter(told);
         match found {
             Ok(mut maps) => {
+                if let (Some(field), Some(here)) = (&mut maps.field, &maps.here) {
+                    field.errors = scene.surface().model().field_errors(&scene.imager, here);
+                }
                 report("searching the RVs");
                 let orbit = FreeVelocities::of(scene, &maps);
                 let warning = orbit.as_ref().and_then(|free| free.warning(scene, &maps));
@@ -271,10 +274,10 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         true => ", at its search bound",
         false => "",
     };
-    let lifetime = field.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2} d"));
+    let [amplitude, slope, lifetime] = field.in_words();
     vec![
-        ("amplitude", format!("{:.4} (SD of the spot filling factor)", field.spot_amplitude)),
-        ("power-law index", format!("{:.3} ({}){}", field.spot_slope, field.spectrum(), bound("spot_slope"))),
+        ("amplitude", format!("{amplitude} (SD of the spot filling factor)")),
+        ("power-law index", format!("{slope} ({}){}", field.spectrum(), bound("spot_slope"))),
         ("lifetime", format!("{lifetime}{}", bound("spot_lifetime_d"))),
         ("RV jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
         ("ln Z", format!("{:.2}", field.ln_evidence)),

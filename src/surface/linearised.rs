@@ -8,7 +8,7 @@ use crate::model::Parameter;
 use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
-use crate::planets::verdict::Remark;
+use crate::planets::verdict::{Remark, decimals};
 use crate::star::observation::RadialVelocity;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
@@ -104,9 +104,45 @@ pub struct SpotField {
     pub ln_evidence: f64,
     /// Which of them lie on a bound of the search.
     pub at_bounds: Vec<String>,
+    /// Their errors, where they were asked for.
+    #[serde(flatten)]
+    pub errors: FieldErrors,
+}
+
+/// Standard errors of a field, the jitter held; `None` of what is given, lies on a bound or is not told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FieldErrors {
+    /// Of the standard deviation of the filling factor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_spot_amplitude: Option<f64>,
+    /// Of the slope of its spectrum.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_spot_slope: Option<f64>,
+    /// Of the lifetime (d).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_spot_lifetime_d: Option<f64>,
+}
+
+/// A number with its error to two digits of that, without one to these decimals.
+fn with_error(value: f64, sigma: Option<f64>, digits: usize) -> String {
+    match sigma {
+        Some(sigma) => format!("{value:.0$} ± {sigma:.0$}", decimals(sigma)),
+        None => format!("{value:.digits$}"),
+    }
 }
 
 impl SpotField {
+    /// Amplitude, slope and lifetime (d) in words, with their errors where these are known.
+    pub fn in_words(&self) -> [String; 3] {
+        let FieldErrors { sigma_spot_amplitude, sigma_spot_slope, sigma_spot_lifetime_d } = self.errors;
+        let of_days = |days| format!("{} d", with_error(days, sigma_spot_lifetime_d, 1));
+        [
+            with_error(self.spot_amplitude, sigma_spot_amplitude, 3),
+            with_error(self.spot_slope, sigma_spot_slope, 2),
+            self.spot_lifetime_d.map_or_else(|| "infinite (static)".to_owned(), of_days),
+        ]
+    }
+
     /// Shape of the spectrum in words.
     pub fn spectrum(&self) -> &'static str {
         if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }
@@ -158,11 +194,11 @@ impl SpotField {
 
     /// It in a line.
     pub fn line(&self) -> String {
-        let SpotField { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
-        let life = self.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2} d"));
+        let SpotField { velocity_jitter_kms, ln_evidence, .. } = self;
+        let [amplitude, slope, lifetime] = self.in_words();
         format!(
-            "spots (marginalised): amplitude {spot_amplitude:.3}, power-law index {spot_slope:.2} ({}), \
-            lifetime {life}; RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",
+            "spots (marginalised): amplitude {amplitude}, power-law index {slope} ({}), \
+            lifetime {lifetime}; RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",
             self.spectrum()
         )
     }
@@ -247,6 +283,7 @@ mod tests {
             velocity_jitter_kms: 0.0,
             ln_evidence: 0.0,
             at_bounds,
+            errors: FieldErrors::default(),
         };
         let shortest = field(Some(0.3), vec![name.clone()]).absorbs().unwrap();
         assert!(shortest.contains("0.30 d") && shortest.contains("star.rotation_period_d"), "{shortest}");

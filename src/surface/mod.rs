@@ -43,7 +43,9 @@ pub use evolving_map::contrast::FittedContrast;
 pub use evolving_map::{
     Change, FieldStart, FittedIndicator, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation, ReadingFit,
 };
-pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
+pub use linearised::{
+    AtTarget, Explained, FieldErrors, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter,
+};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
 pub use model::{At, OrbitOf, Properties, SurfaceModel};
 pub use objective::{ObjectiveKind, UnresolvedSpots};

@@ -5,7 +5,9 @@ use super::expansion::{Expansion, Nuisance};
 use super::imaging::Imager;
 use super::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use super::record::{RebuildError, SurfaceRecord};
-use super::{AtTarget, Change, Explained, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps, WithoutJitter};
+use super::{
+    AtTarget, Change, Explained, FieldErrors, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps, WithoutJitter,
+};
 use crate::model::{ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
 use crate::planets::velocities::VelocityQuadratic;
@@ -99,6 +101,9 @@ pub trait SurfaceModel: Debug + Send + Sync {
 
     /// The profiles as the most probable maps explain them.
     fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained;
+
+    /// How well the profiles tell the field of spots; nothing where there is none.
+    fn field_errors(&self, imager: &Imager, here: &Linearised) -> FieldErrors;
 
     /// What has to be known of the maps.
     fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark>;

@@ -57,6 +57,8 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     let desk = Desk::new(config());
     let said = desk.succeed(&["map", CONFIG, "--out", "maps", "--times", "0.5,1e4,-2"]);
     says(&said, &["amplitude", "power-law index", "lifetime", "ln Z", "χ²/N", "maps at", "-2.000, 0.500, 10000.000 d"]);
+    let lifetime = said.lines().find(|line| line.starts_with("lifetime")).unwrap();
+    assert!(lifetime.contains(" ± ") && lifetime.ends_with(" d"), "{lifetime}");
     says(&said, &["tell little of the star at 10000.00 d", "written", "map.json, profiles.csv, rv.csv, fit.json"]);
     // what is read is what was written
     let map: MapFile = serde_json::from_value(desk.json("maps/map.json")).unwrap();
@@ -101,7 +103,13 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     config["imaging"]["spot_lifetime_d"] = json!(20.0);
     let desk = Desk::new(config);
     let said = desk.succeed(&["map", CONFIG, "--out", "nights"]);
-    says(&said, &["lifetime", " 20.00 d"]);
+    // what is given has no error
+    says(&said, &["lifetime", " 20.0 d\n", " ± "]);
+    let field = &desk.json("nights/fit.json")["field"];
+    assert_eq!(field["sigma_spot_lifetime_d"], Value::Null);
+    let number = |key: &str| field[key].as_f64().unwrap();
+    assert!((0.02..0.5).contains(&(number("sigma_spot_amplitude") / number("spot_amplitude"))), "{field}");
+    assert!((0.05..3.0).contains(&number("sigma_spot_slope")), "{field}");
     // of the profiles, 0.33 to 0.51 d apart, some are in nights of their own
     assert_eq!(desk.json("nights/map.json")["maps"].as_array().unwrap().len(), 5);
     desk.succeed(&["plot", "nights"]);

@@ -73,7 +73,10 @@ fn sentence(file: &FitFile) -> (Tone, String) {
     };
     let chi2 = number(file.summary.chi2_per_datum, 3);
     let sentence = match field.spot_lifetime_d {
-        Some(days) => format!("Evolving maps, one per night: spot lifetime {days:.1} d, χ²/N = {chi2}."),
+        Some(_) => {
+            let [.., lifetime] = field.in_words();
+            format!("Evolving maps, one per night: spot lifetime {lifetime}, χ²/N = {chi2}.")
+        }
         None => format!("Static map with uncertainties: χ²/N = {chi2}."),
     };
     (Tone::Neutral, sentence)
@@ -84,12 +87,12 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         true => " (at its search bound)",
         false => "",
     };
-    let lifetime = field.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2}"));
+    let [amplitude, slope, lifetime] = field.in_words();
     vec![
-        ("spot amplitude (SD of the filling factor)", number(field.spot_amplitude, 4)),
-        ("power-law index", number(field.spot_slope, 3) + bound("spot_slope")),
+        ("spot amplitude (SD of the filling factor)", amplitude),
+        ("power-law index", slope + bound("spot_slope")),
         ("turnover degree ℓ_b", number(field.spot_break_degree, 1)),
-        ("spot lifetime (d)", lifetime + bound("spot_lifetime_d")),
+        ("spot lifetime (d)", lifetime.trim_end_matches(" d").to_owned() + bound("spot_lifetime_d")),
         ("RV jitter (km/s)", number(field.velocity_jitter_kms, 4)),
         ("ln *Z*", number(field.ln_evidence, 2)),
     ]

@@ -174,7 +174,7 @@ fn fitted(marginal: Marginal, hessian: Option<Matrix4<f64>>, known: &Known) -> R
 }
 
 /// Whether a climb with all profiles does.
-fn takes_minutes(imager: &Imager, basis: &Basis) -> bool {
+pub(super) fn takes_minutes(imager: &Imager, basis: &Basis) -> bool {
     imager.epochs() as f64 * (basis.len() as f64).powi(2) > LONG
 }
 

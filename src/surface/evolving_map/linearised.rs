@@ -5,7 +5,7 @@ use crate::field::{Field, FieldError};
 use crate::model::Parameter;
 use crate::surface::expansion::{Nuisance, STELLAR, of_the_star};
 use crate::surface::imaging::Imager;
-use crate::surface::{Linearised, SpotField};
+use crate::surface::{FieldErrors, Linearised, SpotField};
 use std::sync::Arc;
 
 /// The star of a fit.
@@ -41,6 +41,7 @@ impl SpotField {
             velocity_jitter_kms: jitter_kms,
             ln_evidence: fitted.ln_evidence,
             at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
+            errors: FieldErrors::default(),
         }
     }
 }

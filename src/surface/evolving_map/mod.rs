@@ -15,6 +15,7 @@
 //! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
 //! 9. [`fit_indicator`]: what activity indicators have to do with the spots; those that have are epochs, too.
 //! 10. `absorbing`: fields that absorb more of an orbit that is not in the model, for detection limits.
+//! 11. `errors`: how well the profiles tell the field.
 
 mod absorbing;
 mod basis;
@@ -24,6 +25,7 @@ mod condense;
 pub mod contrast;
 mod density;
 mod design;
+mod errors;
 pub mod events;
 mod expand;
 pub(in crate::surface) mod fit;

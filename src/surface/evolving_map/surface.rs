@@ -15,8 +15,8 @@ use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use crate::surface::{
-    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, Properties, SpotField, SurfaceError, SurfaceMaps,
-    SurfaceModel, WithoutJitter,
+    At, AtTarget, Explained, FieldErrors, Linearised, NoMaps, OrbitOf, Properties, SpotField, SurfaceError,
+    SurfaceMaps, SurfaceModel, WithoutJitter,
 };
 use std::sync::Arc;
 
@@ -131,6 +131,10 @@ impl SurfaceModel for EvolvingMap {
 
     fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained {
         nights::explained(imager, observations, here.kept())
+    }
+
+    fn field_errors(&self, imager: &Imager, here: &Linearised) -> FieldErrors {
+        here.kept::<Fitted>().errors(imager, &self.known)
     }
 
     /// What has to be known of the field.

@@ -14,8 +14,8 @@ use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use crate::surface::{
-    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, Properties, SurfaceError, SurfaceMaps, SurfaceModel,
-    WithoutJitter,
+    At, AtTarget, Explained, FieldErrors, Linearised, NoMaps, OrbitOf, Properties, SurfaceError, SurfaceMaps,
+    SurfaceModel, WithoutJitter,
 };
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -108,6 +108,10 @@ impl SurfaceModel for StaticMap {
             SurfaceMaps::of_reference(imager, observations, here.kept());
         let velocities = velocities.into_iter().map(|velocity| velocity.moments).collect();
         Explained { velocities, chi2_per_datum: summary.chi2_per_datum, misfit: checks.warnings }
+    }
+
+    fn field_errors(&self, _: &Imager, _: &Linearised) -> FieldErrors {
+        FieldErrors::default()
     }
 
     /// Whether the image fits as it should.
