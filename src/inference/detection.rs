@@ -399,7 +399,7 @@ impl Detection {
         all.map(|(there, peak)| keplerian(&self.known.beside(&there.quadratic), &self.frequencies, peak)).collect()
     }
 
-    /// A search with the highest peak taken out; `None` where that leaves nothing.
+    /// A search with the highest peak taken out, beside RV offsets of nights; `None` where that leaves nothing.
     fn second_planet(
         &self,
         surface: &dyn SurfaceModel,
@@ -408,7 +408,10 @@ impl Detection {
         let quadratic = &*self.known.beside(&self.last().quadratic);
         let first = self.highest();
         let Some(rest) = without(quadratic, 1.0 / first.porb_over_prot) else { return Ok(None) };
-        let search = imitated(surface, Search::new(&rest, &self.frequencies, settings)?);
+        // with the first planet in the model the jitter is among the noise
+        let none = || Jitters::none(&rest);
+        let jitters = self.without_jitter.as_ref().map_or_else(none, |without| without.beside_nights(&rest));
+        let search = imitated(surface, Search::with_jitter(&jitters, &self.frequencies, settings)?);
         let both = both(quadratic, &self.frequencies, first, search.best());
         Ok(Some(SecondPlanet { search, both }))
     }

@@ -77,6 +77,12 @@ impl WithoutJitter {
         nights.and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
+    /// Beside offsets of nights alone: of velocities among whose noise the jitter is.
+    pub fn beside_nights(&self, quadratic: &VelocityQuadratic) -> Jitters {
+        let beside = |nights: &Nights| Some(beside_offsets(quadratic, nights, (0.0, self.scale_kms), Reach::Stable)?.0);
+        self.nights.as_ref().and_then(beside).unwrap_or_else(|| Jitters::none(quadratic))
+    }
+
     /// Beside jitters of several sizes alone.
     pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
         match self.found_kms > 0.0 {

@@ -114,7 +114,7 @@ fn a_known_planet_is_compared_with_offsets_of_nights() {
     star["star"]["fitted"] = json!([]);
     star["imaging"]["pixels"] = json!(200);
     desk.write("star.json", &star.to_string());
-    let said = desk.succeed(&["periodogram", "star.json", "--draws", "1000", "--out", "search"]);
+    let said = desk.succeed(&["periodogram", "star.json", "--planets", "2", "--draws", "1000", "--out", "search"]);
     println!("{said}");
     says(&said, &["Known planet: marginal. ", "one-sided p = 0.00", "not significant beside RV offsets of nights"]);
     let search = desk.json("search/periodogram.json");
@@ -125,4 +125,7 @@ fn a_known_planet_is_compared_with_offsets_of_nights() {
     let counted = number(&blind["night_offsets_kms"]);
     assert!(counted > 0.03 && counted < 0.0601 && number(&blind["probability"]) > 0.01, "{blind}");
     says(&said, &["simulations, RV offsets of nights "]);
+    // and so does the search beside the highest peak
+    let counted = number(&search["second"]["false_alarm"]["night_offsets_kms"]);
+    assert!(counted > 0.02 && counted < 0.0601, "{counted}");
 }

@@ -156,8 +156,9 @@ impl Nights {
             1 => "The map".to_owned(),
             all => format!("{all} maps"),
         };
+        let [.., lifetime] = self.field.in_words();
         let life = match self.field.spot_lifetime_d {
-            Some(days) => format!("with spots that live {days:.1} d"),
+            Some(_) => format!("with a spot lifetime of {lifetime}"),
             None => "with static spots".to_owned(),
         };
         let how = match kind {
