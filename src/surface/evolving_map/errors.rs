@@ -1,8 +1,7 @@
-//! How well the profiles tell the field: standard errors of amplitude, slope and lifetime from the second derivatives of
-//! ln Z and its priors, the jitter held (Laplace's approximation; MacKay 2003, chapter 27).
+//! How well the profiles tell the field: standard errors of amplitude, slope and lifetime from the second derivatives
+//! of ln Z and its priors, the jitter held (Laplace's approximation; MacKay 2003, chapter 27).
 //!
-//! Maps are found again for each field. Differences span about a standard error, as ln Z is known to a few hundredths
-//! only.
+//! Each field has its own maps. Differences span about a standard error, as ln Z is known to a few hundredths only.
 
 use super::climb::{assumed_at, limits, place};
 use super::fit::takes_minutes;
