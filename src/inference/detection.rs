@@ -24,8 +24,7 @@ use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
 use crate::planets::periodogram::two_planets::{both, without};
 use crate::planets::periodogram::{
-    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
-    co_rotation_penalty,
+    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, co_rotation_penalty,
 };
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
@@ -289,7 +288,7 @@ impl Detection {
         }
         if settings.second_planet {
             report(Stage::SecondPlanet);
-            found.second = found.second_planet(&*surface, settings.search)?;
+            found.second = found.second_planet(&*surface, at, settings.search)?;
         }
         Ok(found)
     }
@@ -399,20 +398,21 @@ impl Detection {
         all.map(|(there, peak)| keplerian(&self.known.beside(&there.quadratic), &self.frequencies, peak)).collect()
     }
 
-    /// A search with the highest peak taken out, beside RV offsets of nights; `None` where that leaves nothing.
+    /// A search with the highest peak taken out, beside the jitter found with it and RV offsets of nights as the search
+    /// for the first planet is; `None` where that leaves nothing.
     fn second_planet(
         &self,
         surface: &dyn SurfaceModel,
+        at: At,
         settings: SearchSettings,
-    ) -> Result<Option<SecondPlanet>, Unbounded> {
-        let quadratic = &*self.known.beside(&self.last().quadratic);
-        let first = self.highest();
-        let Some(rest) = without(quadratic, 1.0 / first.porb_over_prot) else { return Ok(None) };
-        // with the first planet in the model the jitter is among the noise
-        let none = || Jitters::none(&rest);
-        let jitters = self.without_jitter.as_ref().map_or_else(none, |without| without.beside_nights(&rest));
+    ) -> Result<Option<SecondPlanet>, SurfaceError> {
+        let (here, first) = (self.last(), self.highest());
+        let star = surface.without_jitter(at, here)?;
+        let quadratic = star.as_ref().map_or(&here.quadratic, |star| &star.here.quadratic);
+        let Some(rest) = without(&self.known.beside(quadratic), 1.0 / first.porb_over_prot) else { return Ok(None) };
+        let jitters = star.as_ref().map_or_else(|| Jitters::none(&rest), |star| star.beside(&rest));
         let search = imitated(surface, Search::with_jitter(&jitters, &self.frequencies, settings)?);
-        let both = both(quadratic, &self.frequencies, first, search.best());
+        let both = both(&self.known.beside(&here.quadratic), &self.frequencies, first, search.best());
         Ok(Some(SecondPlanet { search, both }))
     }
 }

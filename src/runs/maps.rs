@@ -78,6 +78,7 @@ impl<'a> Maps<'a> {
         match found {
             Ok(mut maps) => {
                 if let (Some(field), Some(here)) = (&mut maps.field, &maps.here) {
+                    report("estimating the errors of the field");
                     field.errors = scene.surface().model().field_errors(&scene.imager, here);
                 }
                 report("searching the RVs");
@@ -274,11 +275,10 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         true => ", at its search bound",
         false => "",
     };
-    let [amplitude, slope, lifetime] = field.in_words();
     vec![
-        ("amplitude", format!("{amplitude} (SD of the spot filling factor)")),
-        ("power-law index", format!("{slope} ({}){}", field.spectrum(), bound("spot_slope"))),
-        ("lifetime", format!("{lifetime}{}", bound("spot_lifetime_d"))),
+        ("amplitude", format!("{} (SD of the spot filling factor)", field.amplitude())),
+        ("power-law index", format!("{} ({}){}", field.slope(), field.spectrum(), bound("spot_slope"))),
+        ("lifetime", field.lifetime() + bound("spot_lifetime_d")),
         ("RV jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
         ("ln Z", format!("{:.2}", field.ln_evidence)),
     ]

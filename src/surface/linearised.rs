@@ -77,12 +77,6 @@ impl WithoutJitter {
         nights.and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
-    /// Beside offsets of nights alone: of velocities among whose noise the jitter is.
-    pub fn beside_nights(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        let beside = |nights: &Nights| Some(beside_offsets(quadratic, nights, (0.0, self.scale_kms), Reach::Stable)?.0);
-        self.nights.as_ref().and_then(beside).unwrap_or_else(|| Jitters::none(quadratic))
-    }
-
     /// Beside jitters of several sizes alone.
     pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
         match self.found_kms > 0.0 {
@@ -115,7 +109,11 @@ pub struct SpotField {
     pub errors: FieldErrors,
 }
 
-/// Standard errors of a field, the jitter held; `None` of what is given, lies on a bound or is not told.
+/// Errors of a logarithm beyond this are two errors of the number.
+const UNEVEN: f64 = 0.25;
+
+/// Standard errors of a field, the jitter held, those of amplitude and lifetime of their logarithms, times the number;
+/// `None` of what is given, lies on a bound or is left open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FieldErrors {
     /// Of the standard deviation of the filling factor.
@@ -137,16 +135,38 @@ fn with_error(value: f64, sigma: Option<f64>, digits: usize) -> String {
     }
 }
 
+/// The same of a number above 0 whose logarithm is known: two errors where these differ.
+fn with_errors(value: f64, sigma: Option<f64>, digits: usize) -> String {
+    match sigma.filter(|sigma| *sigma > UNEVEN * value) {
+        Some(sigma) => {
+            let factor = (sigma / value).exp();
+            let (up, down) = (value * (factor - 1.0), value * (1.0 - factor.recip()));
+            format!("{value:.0$} +{up:.0$} -{down:.0$}", decimals(down))
+        }
+        None => with_error(value, sigma, digits),
+    }
+}
+
 impl SpotField {
-    /// Amplitude, slope and lifetime (d) in words, with their errors where these are known.
-    pub fn in_words(&self) -> [String; 3] {
-        let FieldErrors { sigma_spot_amplitude, sigma_spot_slope, sigma_spot_lifetime_d } = self.errors;
-        let of_days = |days| format!("{} d", with_error(days, sigma_spot_lifetime_d, 1));
-        [
-            with_error(self.spot_amplitude, sigma_spot_amplitude, 3),
-            with_error(self.spot_slope, sigma_spot_slope, 2),
-            self.spot_lifetime_d.map_or_else(|| "infinite (static)".to_owned(), of_days),
-        ]
+    /// The amplitude with its errors, where these are known.
+    pub fn amplitude(&self) -> String {
+        with_errors(self.spot_amplitude, self.errors.sigma_spot_amplitude, 3)
+    }
+
+    /// The slope of the spectrum with its error, where that is known.
+    pub fn slope(&self) -> String {
+        with_error(self.spot_slope, self.errors.sigma_spot_slope, 2)
+    }
+
+    /// The lifetime (d) with its errors, where these are known; `None` for static spots.
+    pub fn lifetime_d(&self) -> Option<String> {
+        let digits = |days: f64| if days < 1.0 { 2 } else { 1 };
+        self.spot_lifetime_d.map(|days| with_errors(days, self.errors.sigma_spot_lifetime_d, digits(days)))
+    }
+
+    /// The lifetime in words.
+    pub fn lifetime(&self) -> String {
+        self.lifetime_d().map_or_else(|| "infinite (static)".to_owned(), |days| format!("{days} d"))
     }
 
     /// Shape of the spectrum in words.
@@ -201,7 +221,7 @@ impl SpotField {
     /// It in a line.
     pub fn line(&self) -> String {
         let SpotField { velocity_jitter_kms, ln_evidence, .. } = self;
-        let [amplitude, slope, lifetime] = self.in_words();
+        let (amplitude, slope, lifetime) = (self.amplitude(), self.slope(), self.lifetime());
         format!(
             "spots (marginalised): amplitude {amplitude}, power-law index {slope} ({}), \
             lifetime {lifetime}; RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",

@@ -156,9 +156,8 @@ impl Nights {
             1 => "The map".to_owned(),
             all => format!("{all} maps"),
         };
-        let [.., lifetime] = self.field.in_words();
-        let life = match self.field.spot_lifetime_d {
-            Some(_) => format!("with a spot lifetime of {lifetime}"),
+        let life = match self.field.lifetime_d() {
+            Some(days) => format!("with a spot lifetime of {days} d"),
             None => "with static spots".to_owned(),
         };
         let how = match kind {

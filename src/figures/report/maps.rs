@@ -73,10 +73,7 @@ fn sentence(file: &FitFile) -> (Tone, String) {
     };
     let chi2 = number(file.summary.chi2_per_datum, 3);
     let sentence = match field.spot_lifetime_d {
-        Some(_) => {
-            let [.., lifetime] = field.in_words();
-            format!("Evolving maps, one per night: spot lifetime {lifetime}, χ²/N = {chi2}.")
-        }
+        Some(_) => format!("Evolving maps, one per night: spot lifetime {}, χ²/N = {chi2}.", field.lifetime()),
         None => format!("Static map with uncertainties: χ²/N = {chi2}."),
     };
     (Tone::Neutral, sentence)
@@ -87,12 +84,12 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         true => " (at its search bound)",
         false => "",
     };
-    let [amplitude, slope, lifetime] = field.in_words();
+    let lifetime_d = field.lifetime_d().unwrap_or_else(|| field.lifetime());
     vec![
-        ("spot amplitude (SD of the filling factor)", amplitude),
-        ("power-law index", slope + bound("spot_slope")),
+        ("spot amplitude (SD of the filling factor)", field.amplitude()),
+        ("power-law index", field.slope() + bound("spot_slope")),
         ("turnover degree ℓ_b", number(field.spot_break_degree, 1)),
-        ("spot lifetime (d)", lifetime.trim_end_matches(" d").to_owned() + bound("spot_lifetime_d")),
+        ("spot lifetime (d)", lifetime_d + bound("spot_lifetime_d")),
         ("RV jitter (km/s)", number(field.velocity_jitter_kms, 4)),
         ("ln *Z*", number(field.ln_evidence, 2)),
     ]

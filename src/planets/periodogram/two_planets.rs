@@ -6,7 +6,7 @@
 //! planet scatter with its own information.
 
 use super::frequencies::Frequencies;
-use super::orbits::{design, velocities};
+use super::orbits::{at, design, velocities};
 use super::peaks::{Peak, parameters, peak, steps};
 use super::refine::{Maximum, Model};
 use crate::planets::velocities::VelocityQuadratic;
@@ -17,7 +17,7 @@ use nalgebra::{DVector, Vector2, Vector3};
 pub struct TwoOrbits {
     /// The first orbit, then the second. Their Delta ln L is that of both together.
     pub orbits: [Peak; 2],
-    /// ln L of both above that of the first alone.
+    /// ln L of both above that of the first alone, in the same quadratic.
     pub gain: f64,
 }
 
@@ -49,6 +49,7 @@ pub fn both(
     let rest = &quadratic.gradient - &quadratic.information * taken;
     let ab = x.tr_mul(&(&quadratic.information * &x)).cholesky()?.solve(&x.tr_mul(&rest));
     let start = DVector::from_vec(vec![ab[0], ab[1], frequency, start_second[0], start_second[1], start_second[2]]);
+    let alone = at(quadratic, frequency).orbit?.delta_ln_l;
     let step = |k_kms: f64| steps(k_kms, frequencies.time_base_cycles);
     let steps = DVector::from_vec([step(first.orbit.k_kms), step(second.orbit.k_kms)].concat());
     let Maximum { theta, delta_ln_l, covariance } = Model { velocities: &sum, steps }.climb(quadratic, start)?;
@@ -56,7 +57,7 @@ pub fn both(
         let own = covariance.as_ref().map(|c| c.fixed_view::<3, 3>(i, i).into_owned());
         peak(cycles, Vector3::new(theta[i], theta[i + 1], theta[i + 2]), own, delta_ln_l)
     };
-    Some(TwoOrbits { orbits: [one(0), one(3)], gain: delta_ln_l - first.orbit.delta_ln_l })
+    Some(TwoOrbits { orbits: [one(0), one(3)], gain: delta_ln_l - alone })
 }
 
 #[cfg(test)]

@@ -1,74 +1,107 @@
 //! How well the profiles tell the field: standard errors of amplitude, slope and lifetime from the second derivatives
 //! of ln Z and its priors, the jitter held (Laplace's approximation; MacKay 2003, chapter 27).
 //!
-//! Each field has its own maps. Differences span about a standard error, as ln Z is known to a few hundredths only.
+//! Each field has its own maps. ln Z is known to a few hundredths only, and so differences span about a standard error,
+//! as far as the climb to the field tells it.
 
 use super::climb::{assumed_at, limits, place};
 use super::fit::takes_minutes;
 use super::{Fitted, Known, Marginal};
+use crate::model::Parameter;
 use crate::surface::FieldErrors;
 use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, Vector4};
-use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Steps in ln amplitude, slope and ln lifetime.
+/// Usual steps in ln amplitude, slope and ln lifetime; others are a third to two of them.
 const STEP: [f64; 3] = [0.15, 0.4, 0.3];
 
+/// Of the width between the bounds a step is this part at most.
+const PART: f64 = 0.4;
+
+/// Second derivatives for a step of 1 that are smaller are the noise of ln Z: the profiles leave that number open.
+const LEAST: f64 = 0.3;
+
+/// Numbers of the field by their place, with the steps along them.
+type Steps = Vec<(usize, f64)>;
+
 impl Fitted {
-    /// Those of what is not known beforehand and lies within its bounds; none where they would take minutes, or where
-    /// ln Z has no maximum here.
+    /// Those of what is not known beforehand, not at a bound and not left open, all of these free together; none where
+    /// they would take minutes.
     pub(super) fn errors(&self, imager: &Imager, known: &Known) -> FieldErrors {
         let here = &self.marginal;
-        let (from, free, limits) = (place(&here.assumed), known.free(&here.assumed), limits(known));
-        let has_room = |i: &usize| from[*i] - STEP[*i] >= limits[*i].0 && from[*i] + STEP[*i] <= limits[*i].1;
-        let told: Vec<usize> = (0..3).filter(|i| free[*i]).filter(has_room).collect();
-        if told.is_empty() || takes_minutes(imager, &here.basis) {
+        let (top, free, limits) = (place(&here.assumed), known.free(&here.assumed), limits(known));
+        if takes_minutes(imager, &here.basis) {
             return FieldErrors::default();
         }
+        let is_at_bound = |i: &usize| self.at_bounds.contains(&Parameter::FIELD[*i].name());
+        let step = |i: usize| {
+            let bend = self.hessian.map_or(0.0, |hessian| hessian[(i, i)]);
+            let of_climb = if bend > 0.0 { bend.sqrt().recip() } else { STEP[i] };
+            (i, of_climb.clamp(STEP[i] / 3.0, 2.0 * STEP[i]).min(PART * (limits[i].1 - limits[i].0)))
+        };
+        let all = (0..3).filter(|i| free[*i] && !is_at_bound(i));
+        let steps: Steps = all.map(step).filter(|(_, step)| *step > 0.0).collect();
+        // beside a bound the differences are those around a place that leaves room for them
+        let mut centre: Vector4<f64> = top;
+        for (i, step) in &steps {
+            centre[*i] = top[*i].clamp(limits[*i].0 + step, limits[*i].1 - step);
+        }
+        // once, before two ask for it
+        here.settled.evidence.explained();
         let height = |moves: &[f64]| {
-            let mut to: Vector4<f64> = from;
-            told.iter().zip(moves).for_each(|(i, steps)| to[*i] += steps * STEP[*i]);
-            let there = assumed_at(to, &here.assumed);
-            let design = Arc::clone(&here.design);
+            let mut to = centre;
+            steps.iter().zip(moves).for_each(|((i, step), times)| to[*i] += times * step);
+            let (there, design) = (assumed_at(to, &here.assumed), Arc::clone(&here.design));
             Marginal::new(imager, &here.basis, design, here.values, there, Some(here)).ok().map(|of| known.height(&of))
         };
-        let Some(information) = information(told.len(), known.height(here), height) else {
-            return FieldErrors::default();
-        };
-        let Some(covariance) = information.cholesky().map(|factor| factor.inverse()) else {
-            return FieldErrors::default();
-        };
-        let sigma = |i: usize| {
-            let at = told.iter().position(|told| *told == i)?;
-            let sigma = covariance[(at, at)].sqrt() * STEP[i];
-            // ln amplitude and ln lifetime
-            Some(if i == 1 { sigma } else { sigma * from[i].exp() })
-        };
-        FieldErrors { sigma_spot_amplitude: sigma(0), sigma_spot_slope: sigma(1), sigma_spot_lifetime_d: sigma(2) }
+        information(steps.len(), height).map_or_else(FieldErrors::default, |found| of(&steps, &found, &top))
     }
 }
 
-/// Minus the second derivatives of a `height` of which this is `here`, in steps; `None` where it is unknown beside.
-fn information(numbers: usize, here: f64, height: impl Fn(&[f64]) -> Option<f64> + Sync) -> Option<DMatrix<f64>> {
-    let pairs: Vec<(usize, usize)> = (0..numbers).flat_map(|i| (0..=i).map(move |j| (i, j))).collect();
-    // the two heights on both sides, along one number or along two together
-    let sums: Vec<f64> = pairs
-        .par_iter()
-        .map(|(i, j)| {
-            let side = |sign: f64| {
-                let mut moves = vec![0.0; numbers];
-                [*i, *j].iter().for_each(|k| moves[*k] = sign);
-                height(&moves)
-            };
-            Some(side(1.0)? + side(-1.0)?)
-        })
-        .collect::<Option<_>>()?;
-    let sum = |i: usize, j: usize| sums[pairs.iter().position(|pair| *pair == (i.max(j), i.min(j))).expect("a pair")];
-    Some(DMatrix::from_fn(numbers, numbers, |i, j| match i == j {
-        true => 2.0 * here - sum(i, i),
-        false => 0.5 * (sum(i, i) + sum(j, j) - sum(i, j)) - here,
-    }))
+/// Minus the second derivatives of a `height` of that many numbers, in steps; `None` where it is unknown somewhere.
+fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync) -> Option<DMatrix<f64>> {
+    let middle = height(&vec![0.0; numbers])?;
+    // the two heights on both sides, along one number or along two together. Of many profiles each has hundreds of
+    // megabytes of maps: no more than two at a time
+    let sum = |i: usize, j: usize| {
+        let side = |sign: f64| {
+            let mut moves = vec![0.0; numbers];
+            [i, j].into_iter().for_each(|k| moves[k] = sign);
+            height(&moves)
+        };
+        let (above, below) = rayon::join(|| side(1.0), || side(-1.0));
+        Some(above? + below?)
+    };
+    let mut found = DMatrix::zeros(numbers, numbers);
+    for i in 0..numbers {
+        found[(i, i)] = 2.0 * middle - sum(i, i)?;
+        for j in 0..i {
+            let both = middle - 0.5 * (found[(i, i)] + found[(j, j)] + sum(i, j)?);
+            (found[(i, j)], found[(j, i)]) = (both, both);
+        }
+    }
+    Some(found)
+}
+
+/// The errors by the second derivatives in steps, for a field at `top`; without those of numbers that are left open.
+fn of(steps: &Steps, information: &DMatrix<f64>, top: &Vector4<f64>) -> FieldErrors {
+    let told: Vec<usize> = (0..steps.len()).filter(|k| information[(*k, *k)] > LEAST).collect();
+    let factor = information.select_rows(&told).select_columns(&told).cholesky();
+    let Some(covariance) = factor.filter(|_| !told.is_empty()).map(|factor| factor.inverse()) else {
+        return FieldErrors::default();
+    };
+    let sigma = |i: usize| {
+        let at = told.iter().position(|k| steps[*k].0 == i)?;
+        Some(covariance[(at, at)].sqrt() * steps[told[at]].1)
+    };
+    // ln amplitude and ln lifetime are what is told
+    let of_logarithm = |i: usize| Some(sigma(i)? * top[i].exp());
+    FieldErrors {
+        sigma_spot_amplitude: of_logarithm(0),
+        sigma_spot_slope: sigma(1),
+        sigma_spot_lifetime_d: of_logarithm(2),
+    }
 }
 
 #[cfg(test)]

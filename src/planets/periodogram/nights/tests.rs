@@ -155,3 +155,28 @@ fn amplitudes_have_the_variance_of_the_gradient() {
     let variance = 4.0 * drawn.iter().sum::<f64>() / drawn.len() as f64;
     assert!((variance / expected - 1.0).abs() < 0.06, "{variance} {expected}");
 }
+
+/// Without a night the offsets are those of the star, whatever the other nights ask for.
+#[test]
+fn without_a_night_the_offsets_stay() {
+    let (mut velocities, nights) = of(0.0, 0.0, 0.0, 7);
+    // one night is off by 0.3 km/s
+    let off = DVector::from_fn(36, |k, _| if k < 3 { 0.3 } else { 0.0 });
+    velocities.gradient += &velocities.information * off;
+    let jitter = (0.09, None);
+    let (all, Offsets { sigma_kms, .. }) = beside_offsets(&velocities, &nights, jitter, Reach::Stable).unwrap();
+    assert!(sigma_kms > 0.03, "{sigma_kms}");
+    // profiles do not depend on each other here
+    let others = VelocityQuadratic {
+        cycles: velocities.cycles[3..].to_vec(),
+        gradient: velocities.gradient.rows(3, 33).into_owned(),
+        information: velocities.information.view((3, 3), (33, 33)).into_owned(),
+    };
+    let nights = nights.of(&others.cycles, &velocities.cycles);
+    assert!(beside_offsets(&others, &nights, jitter, Reach::Stable).is_none(), "the others have no offsets");
+    let some = beside_offsets_of(&all, &others, &nights, jitter).unwrap();
+    assert_eq!((some.null, some.levels.len(), &some.ln_shares), (all.null, all.levels.len(), &all.ln_shares));
+    // that without offsets is the most likely one of the same levels
+    let best = (0..16).max_by(|a, b| some.levels[*a].ln_l.total_cmp(&some.levels[*b].ln_l)).unwrap();
+    assert!(best < 4, "{best}");
+}

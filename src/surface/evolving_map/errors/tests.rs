@@ -1,16 +1,43 @@
 //! Tests of the errors of the field.
 
 use super::*;
+use nalgebra::DVector;
+
+fn bend() -> DMatrix<f64> {
+    DMatrix::from_row_slice(3, 3, &[2.0, 0.7, -0.3, 0.7, 1.5, 0.2, -0.3, 0.2, 3.0])
+}
 
 #[test]
 fn second_derivatives_are_those_of_a_paraboloid() {
-    let bend = DMatrix::from_row_slice(3, 3, &[2.0, 0.7, -0.3, 0.7, 1.5, 0.2, -0.3, 0.2, 3.0]);
     let height = |moves: &[f64]| {
-        let x = nalgebra::DVector::from_column_slice(moves);
+        let x = DVector::from_column_slice(moves);
         // with a slope, which second derivatives do not see
-        Some(5.0 + 0.4 * x[0] - 0.5 * x.dot(&(&bend * &x)))
+        Some(5.0 + 0.4 * x[0] - 0.5 * x.dot(&(bend() * &x)))
     };
-    let found = information(3, 5.0, height).unwrap();
-    assert!((found - &bend).amax() < 1e-12);
-    assert!(information(3, 5.0, |moves| (moves[1] == 0.0).then_some(1.0)).is_none());
+    assert!((information(3, height).unwrap() - bend()).amax() < 1e-12);
+    assert!(information(3, |moves| (moves[1] == 0.0).then_some(1.0)).is_none());
+}
+
+#[test]
+fn errors_are_those_of_the_inverse_and_an_open_number_has_none() {
+    let top = Vector4::new(0.2_f64.ln(), 1.4, 30.0_f64.ln(), 0.0);
+    let steps = vec![(0, 0.1), (1, 0.5), (2, 0.3)];
+    let inverse = bend().try_inverse().unwrap();
+    let errors = of(&steps, &bend(), &top);
+    let [amplitude, slope, lifetime] = [0.2 * 0.1, 0.5, 30.0 * 0.3];
+    let near = |found: Option<f64>, expected: f64| assert!((found.unwrap() - expected).abs() < 1e-12, "{errors:?}");
+    near(errors.sigma_spot_amplitude, amplitude * inverse[(0, 0)].sqrt());
+    near(errors.sigma_spot_slope, slope * inverse[(1, 1)].sqrt());
+    near(errors.sigma_spot_lifetime_d, lifetime * inverse[(2, 2)].sqrt());
+    // the slope given, the lifetime open
+    let errors = of(&vec![(0, 0.1), (2, 0.3)], &DMatrix::from_row_slice(2, 2, &[4.0, 0.2, 0.2, 0.1]), &top);
+    let near = |found: Option<f64>, expected: f64| assert!((found.unwrap() - expected).abs() < 1e-12, "{errors:?}");
+    near(errors.sigma_spot_amplitude, amplitude * 0.5);
+    assert_eq!((errors.sigma_spot_slope, errors.sigma_spot_lifetime_d), (None, None));
+    // what has no maximum has no errors, nor has what is no number
+    for bad in [-1.0, f64::NAN] {
+        assert_eq!(of(&vec![(0, 0.1)], &DMatrix::from_element(1, 1, bad), &top), FieldErrors::default());
+    }
+    let saddle = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
+    assert_eq!(of(&vec![(0, 0.1), (1, 0.3)], &saddle, &top), FieldErrors::default());
 }
