@@ -1,8 +1,7 @@
 //! How well the profiles tell the field: standard errors of amplitude, slope and lifetime from the second derivatives
 //! of ln Z and its priors, the jitter held (Laplace's approximation; MacKay 2003, chapter 27).
 //!
-//! Each field has its own maps. ln Z is known to a few hundredths only, and so differences span about a standard error,
-//! as far as the climb to the field tells it.
+//! Each field has its own maps. ln Z is known to a few hundredths only, and so differences span about a standard error.
 
 use super::climb::{assumed_at, limits, place};
 use super::fit::takes_minutes;
@@ -13,8 +12,11 @@ use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, Vector4};
 use std::sync::Arc;
 
-/// Usual steps in ln amplitude, slope and ln lifetime; others are a third to two of them.
+/// Usual steps in ln amplitude, slope and ln lifetime.
 const STEP: [f64; 3] = [0.15, 0.4, 0.3];
+
+/// Steps are a standard error, but between a third of a usual one and this many.
+const MOST: f64 = 2.0;
 
 /// Of the width between the bounds a step is this part at most.
 const PART: f64 = 0.4;
@@ -30,37 +32,43 @@ impl Fitted {
     /// they would take minutes.
     pub(super) fn errors(&self, imager: &Imager, known: &Known) -> FieldErrors {
         let here = &self.marginal;
-        let (top, free, limits) = (place(&here.assumed), known.free(&here.assumed), limits(known));
         if takes_minutes(imager, &here.basis) {
             return FieldErrors::default();
         }
+        let (top, free, limits) = (place(&here.assumed), known.free(&here.assumed), limits(known));
         let is_at_bound = |i: &usize| self.at_bounds.contains(&Parameter::FIELD[*i].name());
-        let step = |i: usize| {
-            let bend = self.hessian.map_or(0.0, |hessian| hessian[(i, i)]);
-            let of_climb = if bend > 0.0 { bend.sqrt().recip() } else { STEP[i] };
-            (i, of_climb.clamp(STEP[i] / 3.0, 2.0 * STEP[i]).min(PART * (limits[i].1 - limits[i].0)))
-        };
-        let all = (0..3).filter(|i| free[*i] && !is_at_bound(i));
-        let steps: Steps = all.map(step).filter(|(_, step)| *step > 0.0).collect();
-        // beside a bound the differences are those around a place that leaves room for them
-        let mut centre: Vector4<f64> = top;
-        for (i, step) in &steps {
-            centre[*i] = top[*i].clamp(limits[*i].0 + step, limits[*i].1 - step);
-        }
+        let within = |i: usize, step: f64| (i, step.min(PART * (limits[i].1 - limits[i].0)));
+        let all = (0..3).filter(|i| free[*i] && !is_at_bound(i)).map(|i| within(i, STEP[i]));
+        let usual: Steps = all.filter(|(_, step)| *step > 0.0).collect();
         // once, before two ask for it
         here.settled.evidence.explained();
-        let height = |moves: &[f64]| {
-            let mut to = centre;
-            steps.iter().zip(moves).for_each(|((i, step), times)| to[*i] += times * step);
+        let height = |steps: &Steps, moves: &[f64]| {
+            let mut to = top;
+            for ((i, step), times) in steps.iter().zip(moves) {
+                // beside a bound the differences are those around a place that leaves room for them
+                to[*i] = top[*i].clamp(limits[*i].0 + step, limits[*i].1 - step) + times * step;
+            }
             let (there, design) = (assumed_at(to, &here.assumed), Arc::clone(&here.design));
             Marginal::new(imager, &here.basis, design, here.values, there, Some(here)).ok().map(|of| known.height(&of))
         };
-        information(steps.len(), height).map_or_else(FieldErrors::default, |found| of(&steps, &found, &top))
+        let found = || {
+            let first = information(usual.len(), |moves| height(&usual, moves), false)?;
+            // a standard error each
+            let error = |(k, (i, step)): (usize, &(usize, f64))| {
+                let errors = if first[(k, k)] > 0.0 { first[(k, k)].sqrt().recip() } else { MOST };
+                within(*i, step * errors.clamp(1.0 / 3.0, MOST))
+            };
+            let steps: Steps = usual.iter().enumerate().map(error).collect();
+            let all = information(steps.len(), |moves| height(&steps, moves), true)?;
+            Some(of(&steps, &all, &top))
+        };
+        found().unwrap_or_default()
     }
 }
 
-/// Minus the second derivatives of a `height` of that many numbers, in steps; `None` where it is unknown somewhere.
-fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync) -> Option<DMatrix<f64>> {
+/// Minus the second derivatives of a `height` of that many numbers, in steps, the mixed ones where they are wanted;
+/// `None` where it is unknown somewhere.
+fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync, mixed: bool) -> Option<DMatrix<f64>> {
     let middle = height(&vec![0.0; numbers])?;
     // the two heights on both sides, along one number or along two together. Of many profiles each has hundreds of
     // megabytes of maps: no more than two at a time
@@ -76,7 +84,7 @@ fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync) ->
     let mut found = DMatrix::zeros(numbers, numbers);
     for i in 0..numbers {
         found[(i, i)] = 2.0 * middle - sum(i, i)?;
-        for j in 0..i {
+        for j in (0..i).filter(|_| mixed) {
             let both = middle - 0.5 * (found[(i, i)] + found[(j, j)] + sum(i, j)?);
             (found[(i, j)], found[(j, i)]) = (both, both);
         }
