@@ -271,9 +271,11 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
 
 /// Those of a field.
 fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
-    let bound = |name: &str| match field.at_bounds.iter().any(|reached| reached == name) {
-        true => ", at its search bound",
-        false => "",
+    let among = |names: &[String], name: &str| names.iter().any(|of| of == name);
+    let bound = |name: &str| match (among(&field.at_bounds, name), among(&field.errors.unconstrained, name)) {
+        (true, _) => ", at its search bound",
+        (false, true) => ", not constrained",
+        (false, false) => "",
     };
     vec![
         ("amplitude", format!("{} (SD of the spot filling factor)", field.amplitude())),

@@ -114,7 +114,7 @@ const UNEVEN: f64 = 0.25;
 
 /// Standard errors of a field, the jitter held, those of amplitude and lifetime of their logarithms, times the number;
 /// `None` of what is given, lies on a bound or is left open.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FieldErrors {
     /// Of the standard deviation of the filling factor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -125,6 +125,9 @@ pub struct FieldErrors {
     /// Of the lifetime (d).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_spot_lifetime_d: Option<f64>,
+    /// Which of the three the profiles leave open.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unconstrained: Vec<String>,
 }
 
 /// A number with its error to two digits of that, without one to these decimals.

@@ -94,11 +94,14 @@ fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync, mi
 
 /// The errors by the second derivatives in steps, for a field at `top`; without those of numbers that are left open.
 fn of(steps: &Steps, information: &DMatrix<f64>, top: &Vector4<f64>) -> FieldErrors {
-    let told: Vec<usize> = (0..steps.len()).filter(|k| information[(*k, *k)] > LEAST).collect();
+    let (told, open): (Vec<usize>, Vec<usize>) = (0..steps.len()).partition(|k| information[(*k, *k)] > LEAST);
+    let unconstrained = open.iter().map(|k| Parameter::FIELD[steps[*k].0].name().to_owned()).collect();
+    let none = FieldErrors { unconstrained, ..FieldErrors::default() };
+    if told.is_empty() {
+        return none;
+    }
     let factor = information.select_rows(&told).select_columns(&told).cholesky();
-    let Some(covariance) = factor.filter(|_| !told.is_empty()).map(|factor| factor.inverse()) else {
-        return FieldErrors::default();
-    };
+    let Some(covariance) = factor.map(|factor| factor.inverse()) else { return none };
     let sigma = |i: usize| {
         let at = told.iter().position(|k| steps[*k].0 == i)?;
         Some(covariance[(at, at)].sqrt() * steps[told[at]].1)
@@ -109,6 +112,7 @@ fn of(steps: &Steps, information: &DMatrix<f64>, top: &Vector4<f64>) -> FieldErr
         sigma_spot_amplitude: of_logarithm(0),
         sigma_spot_slope: sigma(1),
         sigma_spot_lifetime_d: of_logarithm(2),
+        ..none
     }
 }
 

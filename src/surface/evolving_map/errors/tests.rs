@@ -35,9 +35,12 @@ fn errors_are_those_of_the_inverse_and_an_open_number_has_none() {
     let near = |found: Option<f64>, expected: f64| assert!((found.unwrap() - expected).abs() < 1e-12, "{errors:?}");
     near(errors.sigma_spot_amplitude, amplitude * 0.5);
     assert_eq!((errors.sigma_spot_slope, errors.sigma_spot_lifetime_d), (None, None));
+    assert_eq!(errors.unconstrained, ["spot_lifetime_d"]);
     // what has no maximum has no errors, nor has what is no number
     for bad in [-1.0, f64::NAN] {
-        assert_eq!(of(&vec![(0, 0.1)], &DMatrix::from_element(1, 1, bad), &top), FieldErrors::default());
+        let errors = of(&vec![(0, 0.1)], &DMatrix::from_element(1, 1, bad), &top);
+        let unconstrained = vec!["spot_amplitude".to_owned()];
+        assert_eq!(errors, FieldErrors { unconstrained, ..FieldErrors::default() });
     }
     let saddle = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
     assert_eq!(of(&vec![(0, 0.1), (1, 0.3)], &saddle, &top), FieldErrors::default());
