@@ -271,16 +271,11 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
 
 /// Those of a field.
 fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
-    let among = |names: &[String], name: &str| names.iter().any(|of| of == name);
-    let bound = |name: &str| match (among(&field.at_bounds, name), among(&field.errors.unconstrained, name)) {
-        (true, _) => ", at its search bound",
-        (false, true) => ", not constrained",
-        (false, false) => "",
-    };
+    let caveat = |name: &str| field.caveat(name).map_or_else(String::new, |caveat| format!(", {caveat}"));
     vec![
-        ("amplitude", format!("{} (SD of the spot filling factor)", field.amplitude())),
-        ("power-law index", format!("{} ({}){}", field.slope(), field.spectrum(), bound("spot_slope"))),
-        ("lifetime", field.lifetime() + bound("spot_lifetime_d")),
+        ("amplitude", format!("{} (SD of the spot filling factor){}", field.amplitude(), caveat("spot_amplitude"))),
+        ("power-law index", format!("{} ({}){}", field.slope(), field.spectrum(), caveat("spot_slope"))),
+        ("lifetime", field.lifetime() + &caveat("spot_lifetime_d")),
         ("RV jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
         ("ln Z", format!("{:.2}", field.ln_evidence)),
     ]

@@ -172,6 +172,16 @@ impl SpotField {
         self.lifetime_d().map_or_else(|| "infinite (static)".to_owned(), |days| format!("{days} d"))
     }
 
+    /// What is to be said beside the number of that name.
+    pub fn caveat(&self, name: &str) -> Option<&'static str> {
+        let among = |names: &[String]| names.iter().any(|of| of == name);
+        match (among(&self.at_bounds), among(&self.errors.unconstrained)) {
+            (true, _) => Some("at its search bound"),
+            (false, true) => Some("not constrained"),
+            (false, false) => None,
+        }
+    }
+
     /// Shape of the spectrum in words.
     pub fn spectrum(&self) -> &'static str {
         if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }

@@ -93,7 +93,9 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     assert!(texts(&changes).contains(&"observed − static map") && !changes.contains("NaN"));
     desk.succeed(&["report", "maps"]);
     let page = desk.read("maps/report.html");
-    for sentence in ["Evolving maps, one per night: spot lifetime", "Spot evolution.", "spot lifetime (d)"] {
+    for sentence in
+        ["Evolving maps, one per night: spot lifetime", "Spot evolution.", "spot lifetime (d)", " (not constrained)"]
+    {
         assert!(page.contains(sentence), "{sentence}");
     }
 }

@@ -80,16 +80,13 @@ fn sentence(file: &FitFile) -> (Tone, String) {
 }
 
 fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
-    let bound = |name: &str| match field.at_bounds.iter().any(|reached| reached == name) {
-        true => " (at its search bound)",
-        false => "",
-    };
+    let caveat = |name: &str| field.caveat(name).map_or_else(String::new, |caveat| format!(" ({caveat})"));
     let lifetime_d = field.lifetime_d().unwrap_or_else(|| field.lifetime());
     vec![
-        ("spot amplitude (SD of the filling factor)", field.amplitude()),
-        ("power-law index", field.slope() + bound("spot_slope")),
+        ("spot amplitude (SD of the filling factor)", field.amplitude() + &caveat("spot_amplitude")),
+        ("power-law index", field.slope() + &caveat("spot_slope")),
         ("turnover degree ℓ_b", number(field.spot_break_degree, 1)),
-        ("spot lifetime (d)", lifetime_d + bound("spot_lifetime_d")),
+        ("spot lifetime (d)", lifetime_d + &caveat("spot_lifetime_d")),
         ("RV jitter (km/s)", number(field.velocity_jitter_kms, 4)),
         ("ln *Z*", number(field.ln_evidence, 2)),
     ]
