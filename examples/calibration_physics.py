@@ -7,10 +7,11 @@ The simulator is a program of its own, without a planet model or a kernel in com
 --seed N --effect NAME --k KMS` writes profiles, `observations.txt` and `truth.json`. Each star goes through
 `dimcmc init`, which is told rotation period and inclination as an observer would know them, and `dimcmc periodogram`;
 nothing else is set. Stars of no effect are searched twice more: with the jitter known to be 0, and with a local line
-that is 40 % too wide and a vsini 1 km/s too large. One line per star goes to results/calibration/physics.csv; the
-script can be stopped, and goes on. The first three seeds are the same stars whatever the effect; from the fourth on
-each effect has stars of its own, but for flares, which are compared star by star with none. The second command writes
-results/real-stars.md. Needs numpy.
+that is 40 % too wide and a vsini 1 km/s too large; stars with flares once more without them, by a copy of the simulator
+that draws the flares and leaves them out, so that spots and noise are the same. One line per star goes to
+results/calibration/physics.csv; the script can be stopped, and goes on. The first three seeds are the same stars
+whatever the effect; from the fourth on each effect has other stars, but for flares, which have those of none. The
+second command writes results/real-stars.md. Needs numpy.
 """
 
 import argparse
@@ -37,6 +38,9 @@ OF_NIGHTS, NOT_NOISE = "offsets of nights", "inconsistent with noise"
 # what stars without an effect are searched with, beside the config of `init`
 SETTINGS = ("default", "stable", "wrong-line")
 WIDER, FASTER_KMS = 1.4, 1.0
+# stars with flares once more without them, and how the simulator puts flares into profiles
+UNFLARED = "unflared"
+FLARE = "d = d*(1 - R.uniform(.01, .04)) - R.uniform(.002, .006)*"
 COLUMNS = (
     "effect seed planet setting true_porb_over_prot rotation_period_d profiles season_d lifetime_d finding "
     "false_alarm delta_ln_l period_d sigma_period_d k_kms sigma_k_kms share true_share median_sigma_k_kms "
@@ -62,12 +66,31 @@ def with_setting(config, setting):
     return config
 
 
+def settings_of(effect):
+    if effect == "none":
+        return SETTINGS
+    return ("default", UNFLARED) if effect == "flare" else ("default",)
+
+
+def without_flares(args):
+    """A copy of the simulator whose flares are drawn and not put into profiles: noise and spots are those with them."""
+    text = Path(args.simulator).read_text()
+    if FLARE not in text:
+        sys.exit(f"{args.simulator}: no flares are found in it to leave out: {FLARE}")
+    copy = args.work / "without-flares.py"
+    copy.write_text(text.replace(FLARE, "d = d*(1 - 0*R.uniform(.01, .04)) - 0*R.uniform(.002, .006)*"))
+    return copy
+
+
 def one(effect, number, planet, setting, args):
     k = PLANET_KMS if planet else 0.0
     folder = args.work / f"{effect}-{number}-{'planet' if planet else 'null'}"
+    simulator = args.simulator
+    if setting == UNFLARED:
+        folder, simulator = folder.with_name(f"{folder.name}-{UNFLARED}"), without_flares(args)
     line = {"effect": effect, "seed": number, "planet": int(planet), "setting": setting}
     if not (folder / "truth.json").exists():
-        simulator = [sys.executable, args.simulator, folder, "--seed", number, "--effect", effect, "--k", k]
+        simulator = [sys.executable, simulator, folder, "--seed", number, "--effect", effect, "--k", k]
         subprocess.run(list(map(str, simulator)), check=True)
     truth = json.loads((folder / "truth.json").read_text())
     line |= {"true_porb_over_prot": truth["porb_over_prot"], "lifetime_d": truth["lifetime"]}
@@ -125,7 +148,7 @@ def run(args):
         for planet in (False,) if args.without_planets else (False, True):
             for effect in args.effects:
                 number = simulated(effect, of_effect)
-                for setting in SETTINGS if effect == "none" else SETTINGS[:1]:
+                for setting in settings_of(effect):
                     if (effect, str(number), str(int(planet)), setting) not in done:
                         calibration_table.append(args.csv, COLUMNS, one(effect, number, planet, setting, args))
 
@@ -211,6 +234,23 @@ def settings(rows):
     return calibration_table.table(head.split("; "), lines)
 
 
+def flares(rows):
+    """sigma_K of stars with flares over that of the same stars without."""
+    of_flares = [row for row in rows if row["effect"] == "flare"]
+    pairs = lambda planet: [
+        [row for row in of_flares if row["setting"] == setting and row["planet"] == planet]
+        for setting in ("default", UNFLARED)
+    ]
+    lines = []
+    for planet, title in enumerate(("without a planet", "with a planet of 150 m/s")):
+        ratio = ratios(*pairs(planet))
+        if ratio:
+            over = sum(each > 1.1 for each in ratio)
+            lines.append([title, len(ratio), f"{np.median(ratio):.2f}", f"{min(ratio):.2f} to {max(ratio):.2f}", over])
+    head = "stars; number; sigma_K with flares over that without (median); range; more than 1.1"
+    return calibration_table.table(head.split("; "), lines)
+
+
 def table(args):
     number = calibration_table.number
     rows = [{name: number(value) for name, value in row.items()} for row in calibration_table.read(args.csv)]
@@ -224,6 +264,7 @@ def table(args):
         "Without a planet": false_alarms(without),
         "With a planet of 150 m/s": planets_found(planets, without),
         "Stars of no effect, searched otherwise": settings(rows),
+        "Flares, and the same stars without": flares(rows),
     }
     text += "".join(f"### {title}\n\n{body}" for title, body in sections.items() if body.strip())
     text += "".join(f"- {row['effect']}, {row['seed']:.0f}: {row['error']}\n" for row in failed)

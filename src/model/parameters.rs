@@ -681,8 +681,8 @@ pub const PARAMETERS: [Spec; 32] = [
         key: "spot_slope",
         latex: r"\alpha_\mathrm{spot}",
         symbol: "*α*_{spot}",
-        about: "Power-law index of the angular power spectrum of the spots, with objective \
-                \"marginal-likelihood\".",
+        about: "Power-law index of the angular power spectrum of the spots in l(l+1): the variance of a \
+                harmonic falls as l^(-2 index). With objective \"marginal-likelihood\".",
         config_key: "imaging.spot_slope",
         role: Role::Field(|field| Some(&field.slope), |field, x| field.slope = x),
         ..field((0.0, 3.0), 1.5, Uniform)

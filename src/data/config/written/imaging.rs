@@ -38,8 +38,8 @@ pub struct ImagingSettings {
     /// With objective "marginal-likelihood": prior standard deviation of the spot filling factor, from 0.01 to 1.5.
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_amplitude: Hyperparameter,
-    /// With objective "marginal-likelihood": power-law index of the angular power spectrum of the spots, from 0 (small
-    /// spots) to 3 (large ones).
+    /// With objective "marginal-likelihood": power-law index of the angular power spectrum of the spots in l(l+1) (the
+    /// variance of a harmonic falls as l^(-2 index)), from 0 (small spots) to 3 (large ones).
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_slope: Hyperparameter,
     /// With objective "marginal-likelihood": turnover degree of the angular power spectrum, flat below it, from 0 (a
