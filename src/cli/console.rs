@@ -3,7 +3,7 @@
 //! disk has swallowed are a failure once the command has ended.
 
 use super::Failure;
-use crate::numerics::text::escaped;
+use crate::numerics::text::{escaped, wrapped};
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -11,9 +11,9 @@ use std::sync::Mutex;
 /// What the system said when results could not be printed for the first time.
 static LOST: Mutex<Option<String>> = Mutex::new(None);
 
-/// Prints results, control characters in them escaped.
+/// Prints results, control characters in them escaped and long lines broken.
 pub fn print(text: impl Display) {
-    let lines: Vec<String> = text.to_string().split('\n').map(|line| escaped(line).into_owned()).collect();
+    let lines: Vec<String> = text.to_string().split('\n').map(|line| wrapped(&escaped(line)).into_owned()).collect();
     print_bytes(lines.join("\n").as_bytes());
 }
 
@@ -34,20 +34,19 @@ pub fn print_bytes(bytes: &[u8]) {
     }
 }
 
-/// Says on stderr, in one line, what went wrong; in vain where stderr is gone.
+/// Prints on stderr what went wrong, in one line for whoever searches logs; in vain where stderr is gone.
 pub fn error(message: impl Display) {
-    aside("error", message);
+    aside(&format!("error: {}", escaped(&message.to_string())));
 }
 
-/// Says on stderr, in one line, what has to be known beside the results.
+/// Prints on stderr what has to be known beside the results.
 pub fn note(message: impl Display) {
-    aside("note", message);
+    aside(&wrapped(&format!("note: {}", escaped(&message.to_string()))));
 }
 
-fn aside(kind: &str, message: impl Display) {
-    let message = message.to_string();
+fn aside(text: &str) {
     // one write: a line of another process does not come between
-    let _ = std::io::stderr().write_all(format!("{kind}: {}\n", escaped(&message)).as_bytes());
+    let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// The same where a terminal may be in the middle of the progress line.

@@ -53,6 +53,9 @@ pub struct Args {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "The star and the spectrograph")]
 pub struct KnownArgs {
+    /// Name of the star: the heading of its report
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
     /// Rotation period (d)
     #[arg(long, value_name = "DAYS")]
     rotation_period: Option<f64>,
@@ -171,6 +174,9 @@ impl KnownArgs {
                 "--brightness: no effect on evolving maps, which may be brighter and darker than the photosphere: \
                  delete it, or set --objective spottedness",
             ));
+        }
+        if let Some(name) = &self.name {
+            known.name = Some(Given { value: name.clone(), by: "--name".to_owned() });
         }
         if let Some(value) = self.pixels {
             known.pixels = Some(Given { value, by: "--pixels".to_owned() });

@@ -49,7 +49,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
 
 /// Planets around spotted stars: Doppler imaging and orbit inference from LSD profiles.
 #[derive(Debug, Parser)]
-#[command(name = "dimcmc", version = VERSION, arg_required_else_help = true)]
+#[command(name = "dimcmc", version = VERSION, arg_required_else_help = true, max_term_width = 100)]
 struct Cli {
     #[command(flatten)]
     global: Global,

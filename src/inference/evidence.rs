@@ -4,7 +4,8 @@ use crate::model::{Clock, Elements, FreeParameter, Parameter, Prior, period_prio
 use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrior, evidence};
 use crate::planets::periodogram::Jitters;
 use crate::planets::periodogram::eccentric::LARGEST_ECCENTRICITY;
-use crate::planets::verdict::{decimals, probability};
+use crate::planets::speeds::Speeds;
+use crate::planets::verdict::{decimals, probability, speed};
 use serde::{Deserialize, Serialize};
 
 /// A prior of K that reaches so many times farther than the error of K is said to be wide.
@@ -92,21 +93,19 @@ impl EvidenceRecord {
             format!("; false inclusion probability {chance} at P = {:.digits$} d", best.period_d)
         });
         let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
-            let most = one.k.1[1];
             format!(
-                "The prior of K reaches to {most} km/s, far beyond σ_K ≈ {error_kms:.3} km/s, and lowers all Bayes \
-                factors in proportion. "
+                " The prior of K is far wider than σ_K ≈ {}, which lowers all ln Bayes factors: narrow it.",
+                speed(error_kms, error_kms)
             )
         });
-        let jitter = if !jitters.is_none() { ", RV jitter marginalised" } else { "" };
         let sentence = format!(
-            "{}ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (not used \
-            in the verdict; priors: {priors}; spots fixed at the planet-free fit{jitter})",
-            wide.unwrap_or_default(),
+            "ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (not used in the \
+            verdict). Priors: {priors}.{}",
             number(&circle),
             number(&ellipse),
             number(&two_circles),
-            at.unwrap_or_default()
+            at.unwrap_or_default(),
+            wide.unwrap_or_default()
         );
         EvidenceRecord { circle, ellipse, two_circles, inclusion, priors, sentence }
     }
@@ -141,8 +140,9 @@ impl Assumed {
 
     fn words(&self, rotation_period_d: f64) -> String {
         let days = self.period.0.in_units_of(rotation_period_d.recip());
-        let (k, period) = (words(&self.k.0), words(&days));
-        format!("K {k} km/s, period {period} d, e uniform up to {}", self.largest_e)
+        let unit = Speeds::of(&[self.k.1[1]]);
+        let (k, period) = (words(&self.k.0, unit.factor), words(&days, 1.0));
+        format!("K {k} {}, P {period} d, e uniform to {}", unit.name, self.largest_e)
     }
 }
 
@@ -155,11 +155,17 @@ fn followed(prior: &Prior) -> [f64; 2] {
     }
 }
 
-fn words(prior: &Prior) -> String {
+/// A prior of what is printed times `factor`.
+fn words(prior: &Prior, factor: f64) -> String {
+    let number = |x: f64| {
+        let digits = format!("{:.4}", factor * x);
+        digits.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
     match *prior {
-        Prior::Uniform { min, max } => format!("uniform from {min:.4} to {max:.4}"),
-        Prior::LogUniform { min, max } => format!("log-uniform from {min:.4} to {max:.4}"),
-        Prior::Normal { mean, sd, .. } => format!("normal, {mean:.4} ± {sd:.4}"),
+        Prior::Uniform { min: 0.0, max } => format!("uniform to {}", number(max)),
+        Prior::Uniform { min, max } => format!("uniform from {} to {}", number(min), number(max)),
+        Prior::LogUniform { min, max } => format!("log-uniform from {} to {}", number(min), number(max)),
+        Prior::Normal { mean, sd, .. } => format!("normal, {} ± {}", number(mean), number(sd)),
         Prior::Isotropic { .. } => "isotropic".to_owned(),
         Prior::Disc { .. } | Prior::Periodic => "uniform".to_owned(),
     }

@@ -18,6 +18,37 @@ pub fn shown(path: &Path) -> String {
     escaped(&path.to_string_lossy()).into_owned()
 }
 
+/// Characters of a line that is printed.
+pub const WIDTH: usize = 120;
+
+/// A line, broken between words where it is longer than [`WIDTH`]: prose goes on two characters further in, and the last
+/// column of a table below itself. A table whose last column begins beyond two thirds of the line stays whole.
+pub fn wrapped(line: &str) -> Cow<'_, str> {
+    if line.chars().count() <= WIDTH {
+        return Cow::Borrowed(line);
+    }
+    let indent = line.len() - line.trim_start().len();
+    let last = line.rfind("  ").map_or(0, |at| at + 2);
+    let (begin, within) = if last > indent { (last, line[..last].chars().count()) } else { (indent, indent + 2) };
+    if 3 * within > 2 * WIDTH {
+        return Cow::Borrowed(line);
+    }
+    let (mut text, mut length) = (line[..begin].to_owned(), line[..begin].chars().count());
+    for (k, word) in line[begin..].split(' ').enumerate() {
+        let more = word.chars().count() + usize::from(k > 0);
+        if k > 0 && length + more > WIDTH {
+            text += "\n";
+            text += &" ".repeat(within);
+            length = within + more - 1;
+        } else {
+            text += if k > 0 { " " } else { "" };
+            length += more;
+        }
+        text += word;
+    }
+    Cow::Owned(text)
+}
+
 /// Numbers by name to six digits, each after a comma.
 pub fn listed<'a>(numbers: impl IntoIterator<Item = (&'a String, &'a f64)>) -> String {
     let one = |(name, value): (&String, &f64)| {
@@ -64,6 +95,22 @@ fn numbers_have_six_digits() {
     let names = ["spottedness", "chi2", "log_evidence"].map(str::to_owned);
     let text = listed(names.iter().zip(&[0.0593004, 2764.5, -1.25e5]));
     assert_eq!(text, ", spottedness 0.0593004, chi2 2764.50, log_evidence -125000");
+}
+
+#[test]
+fn long_lines_are_broken_between_words() {
+    let short = "a ".repeat(60);
+    assert!(matches!(wrapped(&short), Cow::Borrowed(_)));
+    let prose = format!("note: {}end", "word ".repeat(50));
+    let lines: Vec<String> = wrapped(&prose).split('\n').map(str::to_owned).collect();
+    assert!(lines.iter().all(|line| line.chars().count() <= WIDTH), "{lines:?}");
+    assert!(lines[1..].iter().all(|line| line.starts_with("  word")), "{lines:?}");
+    assert_eq!(lines.iter().map(|line| line.trim_start()).collect::<Vec<_>>().join(" "), prose);
+    let table = format!("star.vsini_kms  30.5  {}", "measured here ".repeat(12));
+    let lines = wrapped(&table).into_owned();
+    assert!(lines.lines().skip(1).all(|line| line.starts_with(&" ".repeat(22))), "{lines}");
+    let wide = format!("{}{}", "1.234  ".repeat(20), "a b");
+    assert_eq!(wrapped(&wide), wide);
 }
 
 #[test]

@@ -16,5 +16,6 @@ pub mod mixture;
 pub mod modes;
 pub mod occurrence;
 pub mod periodogram;
+pub mod speeds;
 pub mod velocities;
 pub mod verdict;

@@ -118,6 +118,9 @@ pub struct Verdict {
     pub sentence: String,
     /// The number that was compared with the thresholds; null where there is none.
     pub false_alarm_probability: Option<f64>,
+    /// Number of simulations without a planet that it comes from; absent for a planet of known ephemeris.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub draws: Option<usize>,
     /// The best orbit; null where there is none.
     pub signal: Option<Signal>,
     /// What speaks against a planet, in a few words each.
@@ -166,15 +169,21 @@ impl Verdict {
         if !significance.is_finite() {
             return Verdict::not_judged(UNBOUNDED);
         }
-        Verdict::judged(one_sided(significance), signal, remarks, Some(Known { significance, k_upper95_kms, planet }))
+        let known = Known { significance, k_upper95_kms, planet };
+        Verdict::judged((one_sided(significance), None), signal, remarks, Some(known))
     }
 
-    /// Of a signal with that false-alarm probability.
-    pub fn new(false_alarm_probability: f64, signal: Signal, remarks: &[Remark]) -> Self {
-        Verdict::judged(false_alarm_probability, signal, remarks, None)
+    /// Of a signal with that false-alarm probability, from that many simulations.
+    pub fn new(false_alarm_probability: f64, draws: usize, signal: Signal, remarks: &[Remark]) -> Self {
+        Verdict::judged((false_alarm_probability, Some(draws)), signal, remarks, None)
     }
 
-    fn judged(false_alarm_probability: f64, signal: Signal, remarks: &[Remark], known: Option<Known>) -> Self {
+    fn judged(
+        (false_alarm_probability, draws): (f64, Option<usize>),
+        signal: Signal,
+        remarks: &[Remark],
+        known: Option<Known>,
+    ) -> Self {
         if false_alarm_probability.is_nan() {
             return Verdict::not_judged("there is no false-alarm probability");
         }
@@ -191,12 +200,13 @@ impl Verdict {
         };
         let sentence = match known {
             Some(known) => sentence_of_known(finding, false_alarm_probability, &signal, &known, &against),
-            None => sentence(finding, false_alarm_probability, &signal, &against, &[]),
+            None => sentence(finding, &chance(false_alarm_probability, draws), &signal, &against, &[]),
         };
         Verdict {
             finding,
             sentence,
             false_alarm_probability: Some(false_alarm_probability),
+            draws,
             signal: Some(signal),
             against,
             periods: Vec::new(),
@@ -216,7 +226,8 @@ impl Verdict {
         shares.retain(|of| of.share >= LEAST_SHARE);
         shares.truncate(MOST_PERIODS);
         self.periods = if is_clear || shares.len() < 2 { Vec::new() } else { shares };
-        self.sentence = sentence(self.finding, probability, &signal, &self.against, &self.periods);
+        self.sentence =
+            sentence(self.finding, &chance(probability, self.draws), &signal, &self.against, &self.periods);
         self
     }
 
@@ -227,7 +238,7 @@ impl Verdict {
         };
         let mut all: Vec<Remark> = self.against.iter().map(|short| Remark::against(short, "")).collect();
         all.extend_from_slice(remarks);
-        Verdict::judged(probability, signal, &all, self.known).with_periods(self.periods)
+        Verdict::judged((probability, self.draws), signal, &all, self.known).with_periods(self.periods)
     }
 
     /// Where there is no judgement, and why.
@@ -236,6 +247,7 @@ impl Verdict {
             finding: Finding::NotJudged,
             sentence: format!("No verdict: {why}."),
             false_alarm_probability: None,
+            draws: None,
             signal: None,
             against: Vec::new(),
             periods: Vec::new(),
@@ -266,7 +278,7 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
 
 fn sentence(
     finding: Finding,
-    false_alarm_probability: f64,
+    chance: &str,
     signal: &Signal,
     against: &[String],
     periods: &[PeriodShare],
@@ -281,7 +293,7 @@ fn sentence(
         }
     };
     let orbit_head = if ambiguous.is_empty() { ": " } else { ". Highest peak: " };
-    let (orbit, chance) = (signal.words(), false_alarm(false_alarm_probability));
+    let orbit = signal.words();
     let percent = |share: f64| 100.0 * share;
     match finding {
         Finding::NoPlanetNeeded => {
@@ -305,15 +317,28 @@ fn caveats(against: &[String]) -> String {
     if against.is_empty() { String::new() } else { format!(" Caveats: {}.", against.join("; ")) }
 }
 
-/// Below this a false-alarm probability is extrapolated beyond the simulations that it rests on.
-pub const SIMULATED_FAP: f64 = 1e-4;
+/// Simulations of a search whose file does not have their number.
+pub fn usual_draws() -> usize {
+    10_000
+}
 
-/// A false-alarm probability in words; where it is extrapolated, an upper limit with the extrapolation.
-pub fn false_alarm(p: f64) -> String {
-    match p {
-        0.0 => "FAP < 1e-300".to_owned(),
-        p if p < SIMULATED_FAP => format!("FAP < {SIMULATED_FAP:e} (extrapolated: {p:.0e})"),
-        p => format!("FAP = {}", probability(p)),
+fn chance(p: f64, draws: Option<usize>) -> String {
+    false_alarm(p, draws.unwrap_or_else(usual_draws))
+}
+
+/// The limit that so many simulations give, where `p` is extrapolated below it.
+pub fn extrapolated(p: f64, draws: usize) -> Option<String> {
+    let limit = 1.0 / draws.max(1) as f64;
+    (p < limit).then(|| format!("{limit:.1e}").replace(".0e", "e"))
+}
+
+/// A false-alarm probability in words; where it is extrapolated beyond the simulations, an upper limit with the
+/// extrapolation.
+pub fn false_alarm(p: f64, draws: usize) -> String {
+    match (p, extrapolated(p, draws)) {
+        (0.0, _) => "FAP < 1e-300".to_owned(),
+        (p, Some(limit)) => format!("FAP < {limit} (extrapolated: {p:.0e})"),
+        (p, None) => format!("FAP = {}", probability(p)),
     }
 }
 
@@ -362,7 +387,7 @@ mod tests {
     #[test]
     fn a_planet_may_be_detected_while_its_period_is_not() {
         let share = |period_d: f64, share: f64| PeriodShare { period_d, share };
-        let of = |shares: Vec<PeriodShare>| Verdict::new(1e-5, SIGNAL, &[]).with_periods(shares);
+        let of = |shares: Vec<PeriodShare>| Verdict::new(1e-5, 10_000, SIGNAL, &[]).with_periods(shares);
         let two = of(vec![share(4.93, 0.4), share(0.831, 0.58), share(1.2, 0.01)]);
         assert_eq!(two.finding, Finding::Detection);
         assert_eq!(two.periods, [share(0.831, 0.58), share(4.93, 0.4)]);
@@ -375,13 +400,13 @@ mod tests {
         assert!(clear.periods.is_empty() && clear.sentence.starts_with("Detection: "), "{}", clear.sentence);
         let settled = less.with_periods(vec![share(4.93, 0.97), share(0.831, 0.03)]);
         assert!(settled.periods.is_empty() && !settled.sentence.contains("ambiguous"), "{}", settled.sentence);
-        let none = Verdict::new(0.5, SIGNAL, &[]).with_periods(vec![share(4.93, 0.5), share(0.831, 0.5)]);
+        let none = Verdict::new(0.5, 10_000, SIGNAL, &[]).with_periods(vec![share(4.93, 0.5), share(0.831, 0.5)]);
         assert!(!none.sentence.contains("ambiguous"), "{}", none.sentence);
     }
 
     #[test]
     fn one_number_and_what_speaks_against_it_decide() {
-        let verdict = |p: f64, remarks: &[Remark]| Verdict::new(p, SIGNAL, remarks);
+        let verdict = |p: f64, remarks: &[Remark]| Verdict::new(p, 10_000, SIGNAL, remarks);
         assert_eq!(verdict(1e-14, &[]).finding, Finding::Detection);
         assert_eq!(verdict(5e-3, &[]).finding, Finding::Candidate);
         assert_eq!(verdict(0.01, &[]).finding, Finding::NoPlanetNeeded);

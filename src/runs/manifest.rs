@@ -94,7 +94,7 @@ impl Manifest {
             let here = 1.0 / f64::from(n);
             low < here * (1.0 + NEAR_ROTATION) && high > here * (1.0 - NEAR_ROTATION)
         })?;
-        let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
+        let rotation = if fraction == 1 { "P_rot".to_owned() } else { format!("P_rot/{fraction}") };
         Some(format!(
             "The period lies within {:.0} % of {rotation}, where it is degenerate with spot modulation: the \
             interval of K is too narrow; compare with `dimcmc periodogram` or imaging.unresolved_spots: \"fitted\".",

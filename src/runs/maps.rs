@@ -200,7 +200,7 @@ impl FreeVelocities {
         Some(format!(
             "{AS_ORBIT} ({}, {}){absorbed}: run `dimcmc periodogram {}`.",
             signal.words(),
-            false_alarm(*chance),
+            false_alarm(*chance, BlindSearchOptions::default().draws),
             scene.settings.path.display()
         ))
     }

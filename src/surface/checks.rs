@@ -128,16 +128,14 @@ impl Checks {
         doubts.extend(self.of_profiles());
         if size(self.core_excess_sigma) > FAR {
             doubts.push(format!(
-                "chi2 is {:.2} per datum in the core of the line and {:.2} outside: errors, local line or continuum \
-                are not right \
-                 everywhere",
+                "χ²/N = {:.2} in the line core, {:.2} outside: check star.line, the uncertainties and the continuum",
                 self.chi2_per_datum_core, self.chi2_per_datum_outside
             ));
         }
         let correlated = size(self.neighbour_correlation) > FAR * self.sigma_neighbour_correlation;
         if correlated && !neighbours_go_together {
             doubts.push(format!(
-                "residuals of neighbouring bins correlate by {:.2}: what is left over is not only noise",
+                "residuals of neighbouring bins correlate by {:.2}: not white noise",
                 self.neighbour_correlation
             ));
         }

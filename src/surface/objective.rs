@@ -15,7 +15,7 @@ pub enum ObjectiveKind {
     /// `max_s [alpha S - chi2/2]` at the alpha of the reference solution; spelt `regularized-likelihood` too.
     #[serde(alias = "regularized-likelihood")]
     RegularisedLikelihood,
-    /// The likelihood with all maps integrated out, which may change with time: spots are a Gaussian field.
+    /// The likelihood marginalised over evolving maps, which are a Gaussian process (GP).
     #[default]
     MarginalLikelihood,
 }
@@ -32,14 +32,14 @@ impl ObjectiveKind {
     }
 }
 
-/// What is known of the spots that a map leaves over.
+/// How spots count that a map does not resolve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnresolvedSpots {
     /// As the entropy has them (the paper's method): small and independent. Intervals are too narrow where spots have
     /// edges, above all near Porb = Prot.
     Entropy,
-    /// The chain counts them as noise, of a size that the data tell, as a jitter's, and that is integrated over.
+    /// As noise of fitted size, marginalised over as a jitter is.
     #[default]
     Fitted,
 }

@@ -49,9 +49,8 @@ impl ImageRecord {
         (self.chi2_target - self.chi2_reach < noise).then(|| {
             let per_datum = |chi2: f64| chi2 / self.data as f64;
             format!(
-                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to \
-                {:.3}): see \
-                 whether the answer stays when imaging.chi2_target is raised by {:.3}",
+                "the target χ²/N of {:.3} is close to the floor (three times its lambda reaches {:.3}): check that the \
+                 result stays when imaging.chi2_target is raised by {:.3}",
                 per_datum(self.chi2_target),
                 per_datum(self.chi2_reach),
                 per_datum(noise)
@@ -92,8 +91,8 @@ impl FieldRecord {
             let near = |bound: f64| (value / bound - 1.0).abs() < REACHED;
             let bound = [low, high].into_iter().find(|bound| near(*bound))?;
             Some(match (p, bound == high) {
-                (Parameter::SpotLifetime, true) => "the profiles do not show that the spots change".to_owned(),
-                _ => format!("{} lies on the bound of its search, {bound}", p.name()),
+                (Parameter::SpotLifetime, true) => "no spot evolution detected".to_owned(),
+                _ => format!("{} is at its search bound, {bound}: unconstrained, or the model is misspecified", p.name()),
             })
         };
         Parameter::FIELD.iter().filter_map(on_bound).chain(self.widened(free)).collect()
@@ -141,7 +140,7 @@ pub enum RebuildError {
     #[error(transparent)]
     Field(#[from] FieldError),
     /// It comes out differently.
-    #[error("the reference comes out differently here ({what} {now:e} instead of {then:e})")]
+    #[error("the reference differs on this machine ({what} {now:e} instead of {then:e})")]
     Differs {
         /// Which of its numbers.
         what: &'static str,

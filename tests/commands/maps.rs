@@ -61,7 +61,7 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     assert!(line("power-law index").contains(" ± "), "{said}");
     // profiles of 5 d do not tell how long spots live
     assert!(line("lifetime").ends_with(" d, not constrained"), "{said}");
-    says(&said, &["tell little of the star at 10000.00 d", "written", "map.json, profiles.csv, rv.csv, fit.json"]);
+    says(&said, &["hardly constrain the map at 10000.00 d", "written", "map.json, profiles.csv, rv.csv, fit.json"]);
     // what is read is what was written
     let map: MapFile = serde_json::from_value(desk.json("maps/map.json")).unwrap();
     let fit: FitFile = serde_json::from_value(desk.json("maps/fit.json")).unwrap();

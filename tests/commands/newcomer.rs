@@ -149,6 +149,9 @@ impl Star {
         for (verdict, text) in verdicts.iter().zip([&search, &sample]) {
             assert!(text.starts_with(verdict["sentence"].as_str().unwrap()), "{text}");
         }
+        for printed in [&map, &search, &sample] {
+            assert!(printed.lines().count() <= 50, "{printed}");
+        }
         let begin: String = verdicts[1]["sentence"].as_str().unwrap().chars().take(30).collect();
         assert!(page.contains(&begin), "the page has the verdict");
         Walk { desk, texts: [init, map, search, sample], verdicts }

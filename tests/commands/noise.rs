@@ -221,7 +221,7 @@ fn the_target_is_where_velocities_stop_shrinking() {
     let mut whole: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
     whole["imaging"] = config;
     desk.write("config.json", &whole.to_string());
-    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["target chi2", "velocities left over"]);
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["target chi2", "filtered residual RV rms"]);
     let fit = desk.json("map/fit.json");
     let target = &fit["measured"]["chi2_target"];
     assert!((0.8..1.15).contains(&number(&target["value"])), "{target}");

@@ -84,8 +84,38 @@ pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
     command.args(args).current_dir(folder).output().unwrap()
 }
 
+/// No line of prose is longer than 120 characters.
+fn lines_fit(args: &[&str], stdout: &[u8]) {
+    // these are for other programs
+    if ["completions", "schema", "man"].contains(&args[0]) {
+        return;
+    }
+    let is_long = |line: &&str| line.chars().count() > 120 && !line.trim_start().contains("  ");
+    let is_path = |line: &&str| line.split(' ').any(|word| word.chars().count() > 60);
+    let printed = std::str::from_utf8(stdout).unwrap();
+    let long: Vec<&str> = printed.lines().filter(|line| is_long(line) && !is_path(line)).collect();
+    assert!(long.is_empty(), "{args:?}: {long:#?}");
+}
+
+/// What the program prints, its long lines whole again: those that the first word of the next one would have made
+/// longer than 120 characters.
 pub fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
+    let printed = String::from_utf8(bytes.to_vec()).unwrap();
+    let mut lines: Vec<String> = Vec::new();
+    let mut before = 0;
+    for line in printed.split('\n') {
+        let length = line.chars().count();
+        let word = line.split_whitespace().next().map_or(0, |word| word.chars().count());
+        match lines.last_mut() {
+            Some(last) if line.starts_with("  ") && word > 0 && before <= 120 && before + 1 + word > 120 => {
+                last.push(' ');
+                last.push_str(line.trim_start());
+            }
+            _ => lines.push(line.to_owned()),
+        }
+        before = length;
+    }
+    lines.join("\n")
 }
 
 impl Desk {
@@ -131,6 +161,7 @@ impl Desk {
         let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
         assert_eq!(output.status.code(), Some(0), "{args:?}: {stderr}");
         assert_eq!(stderr, "", "silent when stderr is no terminal");
+        lines_fit(args, &output.stdout);
         stdout
     }
 

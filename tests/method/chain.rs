@@ -241,7 +241,7 @@ fn a_displaced_ensemble_and_a_stuck_walker_are_not_converged() {
     assert!(summary.parameters["phi"].rhat.unwrap() < 1.01, "the other parameter is fine");
     let text = table(&summary, None);
     let last = text.lines().last().unwrap();
-    assert!(last.starts_with("Chain NOT converged: k_kms: R-hat 1.") && last.contains("--extend"), "{last}");
+    assert!(last.starts_with("Not converged: do not quote intervals. k_kms: R-hat 1.") && last.contains("--extend"), "{last}");
 
     // of several parameters one number of steps, that of the worst
     let slow = chain(&["a", "b", "c"], [4, 8, 400], &mut |rng, [ensemble, ..]| {
@@ -275,7 +275,7 @@ fn short_and_constant_chains_are_summarised_without_a_verdict() {
         assert!(!summary.converged && summary.parameters["k_kms"].rhat.is_none());
         assert_eq!(summary.parameters["k_kms"].median, 0.1);
         let text = table(&summary, None);
-        assert!(text.contains("NOT converged"), "{text}");
+        assert!(text.contains("Not converged"), "{text}");
         serde_json::to_string(&summary).unwrap();
     }
     let empty = Chain::new(small().shape().clone());

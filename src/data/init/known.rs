@@ -18,6 +18,7 @@ pub struct Given<T> {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
 pub struct Known {
+    pub name: Option<Given<String>>,
     pub rotation_period_d: Option<Given<f64>>,
     pub epoch_d: Option<Given<f64>>,
     pub inclination_deg: Option<Given<f64>>,

@@ -386,7 +386,7 @@ impl Trial {
                     self.errors.iter().flatten().find_map(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
                         format!("; without it \"auto\" makes the errors {misfit:.1} times those of the continuum")
                     });
-                format!("test fit: {maps}, but not as well as the errors promise: {}{larger}", diagnosis.text)
+                format!("test fit: {maps}, but not to within the uncertainties: {}{larger}", diagnosis.text)
             }
         };
         let star = self.star.as_ref().map(|star| format!("fitted star: {star}"));

@@ -148,8 +148,12 @@ impl Values {
         let inclination_deg = ledger.settle(("star.inclination_deg", "deg"), &known.inclination_deg, inclination);
         let vsini_kms = ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini);
         let gamma_kms = known.line_gamma_kms.as_ref().map(|given| given.value);
+        let name = known.name.as_ref().map(|given| {
+            ledger.note("star.name", &given.value, "", Source::Given, given.by.as_str());
+            given.value.clone()
+        });
         let star = Star {
-            name: None,
+            name,
             rotation_period_d,
             epoch_d,
             inclination_deg,

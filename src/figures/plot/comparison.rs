@@ -21,8 +21,8 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let row_mm = 44.0;
     let mut figure = Figure::new("comparison", PAGE_MM, row_mm * rows as f64);
     figure.caption =
-        "Estimates of each parameter with their 68 % intervals: the chain's median, the vertex of the paraboloid, the \
-                      median of the whole landscape, and the injected value."
+        "Estimates of each parameter with 68 % intervals: median of the chain, vertex of the paraboloid, median of the \
+         likelihood grid, and the injected value."
             .into();
     let left = 50.0;
     let cell = (figure.width - left) / columns as f64;

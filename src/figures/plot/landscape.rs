@@ -51,7 +51,7 @@ pub(super) fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, 
     if scene.computed < scene.grid.len() {
         let note =
             format!("{NODES}: {} of {} nodes are there, the rest is left white", scene.computed, scene.grid.len());
-        figure.caption += &format!(" Not the whole landscape: {note}.");
+        figure.caption += &format!(" The likelihood grid is not complete: {note}.");
         figure.notes.push(note);
     }
     Ok(vec![figure])
@@ -81,11 +81,11 @@ impl Scene {
         if let (Some(chain), Some(run)) = (&chain, run) {
             let missing = header.grid.names().find(|name| !chain.summary.names.iter().any(|sampled| sampled == name));
             if let Some(name) = missing {
-                let problem = format!("{name} is an axis of the landscape and not sampled in the run");
+                let problem = format!("{name} is an axis of the likelihood grid and not sampled in the run");
                 return Err(PlotError::Content { path: run.into(), problem });
             }
             if chain.manifest.origin.data_sha256 != header.origin.data_sha256 {
-                let problem = format!("the run is of other observations than the landscape in {}", folder.display());
+                let problem = format!("the run is of other observations than the likelihood grid in {}", folder.display());
                 return Err(PlotError::Content { path: run.into(), problem });
             }
         }
@@ -116,7 +116,7 @@ impl Scene {
     /// The landscape of a single parameter.
     fn curve(&self) -> Figure {
         let mut figure = Figure::new("landscape", COLUMN_MM, 70.0);
-        figure.caption = "Landscape: chi2 at the nodes (points) minus the lowest, with the paraboloid (line).".into();
+        figure.caption = "Likelihood grid: chi2 at the nodes (points) minus the lowest, with the paraboloid (line).".into();
         let frame = Rect { left: 38.0, top: 8.0, width: figure.width - 46.0, height: figure.height - 36.0 };
         let points: Vec<[f64; 2]> = self.nodes[0].iter().enumerate().map(|(k, x)| [*x, self.at(&[k])]).collect();
         let highest = points.iter().map(|p| p[1]).filter(|y| y.is_finite()).fold(1.0, f64::max).min(DARKEST * DARKEST);
@@ -280,11 +280,9 @@ impl Scene {
         };
         let chain = if self.chain.is_some() { " Dashed: 68 and 95 % of the chain." } else { "" };
         format!(
-            "Landscape: the root of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, \
-            nodes \
-             without a reconstruction white.{rows} Contours of landscape and paraboloid are at Delta chi2 = 2.30 and \
-             5.99, 68 and \
-             95 % of two Gaussian parameters.{paraboloid}{chain}"
+            "Likelihood grid: root of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, \
+             nodes without a reconstruction white.{rows} Contours of grid and paraboloid: Delta chi2 = 2.30 and 5.99, \
+             68 and 95 % of two Gaussian parameters.{paraboloid}{chain}"
         )
     }
 }

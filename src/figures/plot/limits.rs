@@ -1,7 +1,7 @@
 //! The detection map: which share of the orbits of each period and semi-amplitude a blind search recovers.
 
-use super::symbols::Speeds;
 use super::{POSITIVE, PlotError};
+use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{BLUE, ColourMap, GREY, SKY, VERMILION, WHITE};
 use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};

@@ -1,8 +1,9 @@
 //! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of
 //! observation alone do, and how well K is known.
 
-use super::symbols::{PERIOD_DIGITS, Speeds, decimals};
+use super::symbols::{PERIOD_DIGITS, decimals};
 use super::{POSITIVE, PlotError, velocities};
+use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figures::drawing::panel::Sides;

@@ -8,6 +8,7 @@ use crate::figures::drawing::panel::{Marker, Sides};
 use crate::figures::drawing::{
     Align, Axis, Colour, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Scale, Stroke, range_of,
 };
+use crate::planets::speeds::Speeds;
 use crate::runs::origin;
 use crate::runs::plan::{AfterRecord, Aim, CSV, Choice, JSON, Merit, PlanFile};
 use std::path::Path;
@@ -72,6 +73,9 @@ fn colour(schedule: usize) -> Colour {
 fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     let (schedule, period) = (table.column("schedule")?, table.column_within("period_d", POSITIVE)?);
     let (sigma, k95) = (table.column("sigma_k_kms")?, table.column("k95_kms")?);
+    let finite: Vec<f64> = sigma.iter().chain(k95).copied().filter(|k| k.is_finite()).collect();
+    let unit = Speeds::of(&finite);
+    let shown = |k: &[f64]| k.iter().map(|kms| unit.factor * kms).collect::<Vec<_>>();
     let mut figure = Figure::new("plan", PAGE_MM, 92.0);
     figure.caption = CAPTION.into();
     let (left, top, gap) = (40.0, 24.0, 44.0);
@@ -79,19 +83,19 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     let height = figure.height - top - 52.0;
     let periods = Rect { left, top, width: 0.62 * room, height };
     let nights = Rect { left: left + periods.width + gap, top, width: 0.38 * room, height };
-    let heights = range_of(sigma.iter().chain(k95).copied().filter(|k| k.is_finite()), Scale::Log, 0.06);
+    let heights = range_of(shown(&finite).into_iter(), Scale::Log, 0.06);
     let above = Panel {
         frame: periods,
         x: Axis::log("period (d)", range_of(period.iter().copied(), Scale::Log, 0.0)),
-        y: Axis::log("*K* (km/s)", heights),
+        y: Axis::log(&format!("*K* ({})", unit.name), heights),
     };
     let [of_sigma, of_k95] = [|c| Stroke::new(c, 0.9).dashed(), |c| Stroke::new(c, 1.1)];
     for k in 0..file.schedules.len() {
         let of = |y: &[f64]| -> Vec<[f64; 2]> {
             (0..period.len()).filter(|j| schedule[*j] == (k + 1) as f64).map(|j| [period[j], y[j]]).collect()
         };
-        above.line(&mut figure, "sigma-k", &of(sigma), of_sigma(colour(k)));
-        above.line(&mut figure, "k95", &of(k95), of_k95(colour(k)));
+        above.line(&mut figure, "sigma-k", &of(&shown(sigma)), of_sigma(colour(k)));
+        above.line(&mut figure, "k95", &of(&shown(k95)), of_k95(colour(k)));
     }
     rotation(&mut figure, &above, file);
     above.frame(&mut figure, Sides::BOTH);
@@ -99,12 +103,12 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     let beside = Panel {
         frame: nights,
         x: Axis::linear("nights", [0.0, 1.08 * most.max(1) as f64]),
-        y: Axis::log("median *K* (km/s)", range_of(medians(file), Scale::Log, 0.08)),
+        y: Axis::log(&format!("median *K* ({})", unit.name), range_of(medians(file).map(|kms| unit.factor * kms), Scale::Log, 0.08)),
     };
     for (k, schedule) in file.schedules.iter().enumerate() {
         let of = |number: fn(&AfterRecord) -> Option<f64>| -> Vec<[f64; 2]> {
             let after = schedule.after.iter();
-            after.map(|after| [after.nights as f64, number(after).unwrap_or(f64::NAN)]).collect()
+            after.map(|after| [after.nights as f64, number(after).map_or(f64::NAN, |kms| unit.factor * kms)]).collect()
         };
         for (class, points, stroke) in [
             ("sigma-k", of(|after| after.sigma_k_kms), of_sigma(colour(k))),
@@ -149,6 +153,6 @@ fn rotation(figure: &mut Figure, panel: &Panel, file: &PlanFile) {
     }
 }
 
-const CAPTION: &str = "Forecast of a campaign, spots integrated out. Left: standard error of K (dashed) and the K of \
-a planet that is detected with 95 % probability, false alarms below 1 % (drawn through), at every period; dotted: the \
-rotation period and its fractions. Right: medians over all periods, after more and more nights.";
+const CAPTION: &str = "Forecast of a campaign, marginalised over spots. Left: σ_K (dashed) and K detected with 95 % \
+probability (FAP < 1 %; solid) at every period; dotted: the rotation period and its fractions. Right: medians over all \
+periods against the number of nights.";

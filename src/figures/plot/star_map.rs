@@ -122,7 +122,7 @@ pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     };
     let mut star = Star::injected(content, None, &injected);
     star.title = Content::Spots.title("injected", injected.coverage);
-    let when = if injected.is_changing { ", as large as they are in the middle of the data" } else { "" };
+    let when = if injected.is_changing { ", at their size in the middle of the data" } else { "" };
     let text = format!("Map of the injected {what} at cycle 0{when}. {HOW_TO_READ}");
     Ok(Some(draw(&[star], content, &cycles, text)))
 }

@@ -1,8 +1,8 @@
 //! A sample of stars: the completeness of all searches together with the planets found, and the posterior of the rate
 //! of planets.
 
-use super::symbols::Speeds;
 use super::{POSITIVE, PlotError};
+use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{ColourMap, GREY, SERIES, SKY, VERMILION, WHITE};
 use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};

@@ -1,5 +1,6 @@
 //! The symbols of astronomers for parameters.
 
+use crate::planets::speeds::Speeds;
 use crate::figures::drawing::Axis;
 use crate::model::Parameter;
 
@@ -43,28 +44,7 @@ fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// What velocities (km/s) are drawn in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Speeds {
-    /// What a velocity in km/s is multiplied by.
-    pub factor: f64,
-    /// The unit.
-    pub name: &'static str,
-}
-
 impl Speeds {
-    /// Velocities up to this are drawn in m/s.
-    const SMALL_KMS: f64 = 1.5;
-
-    /// Those of a star.
-    pub const KMS: Speeds = Speeds { factor: 1.0, name: "km/s" };
-
-    /// m/s for small ones.
-    pub fn of(kms: &[f64]) -> Self {
-        let largest = kms.iter().filter(|x| x.is_finite()).fold(0.0, |largest: f64, x| largest.max(x.abs()));
-        if largest < Self::SMALL_KMS { Speeds { factor: 1e3, name: "m/s" } } else { Speeds::KMS }
-    }
-
     /// An axis of them.
     pub fn axis(self, label: &str, range_kms: [f64; 2]) -> Axis {
         Axis::linear(&format!("{label} ({})", self.name), range_kms.map(|kms| self.factor * kms))

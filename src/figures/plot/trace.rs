@@ -240,10 +240,8 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
 /// By what the chain counts as converged, and whether it does.
 fn criterion(sampled: &Sampled) -> String {
     let Goals { rhat, ess } = sampled.goals;
-    let verdict = if sampled.summary.converged { "has converged" } else { "has not converged" };
-    format!(
-        "The chain {verdict}; that takes an R-hat of {rhat} at most and an effective sample size of {ess} at least."
-    )
+    let verdict = if sampled.summary.converged { "Converged" } else { "Not converged" };
+    format!("{verdict}; criterion: R-hat of at most {rhat} and effective sample size of at least {ess}.")
 }
 
 const DASHES: [&[f64]; 2] = [&[], &[1.0, 1.6]];

@@ -2,9 +2,10 @@
 //! folded with the orbit.
 
 use super::ephemeris::ephemeris;
-use super::symbols::{Speeds, decimals};
+use super::symbols::{decimals};
 use super::times::{Clock, Stretch, stretches};
 use super::{ANY, PlotError};
+use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};
 use crate::data::io::provenance::Provenance;

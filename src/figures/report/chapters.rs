@@ -2,13 +2,14 @@
 
 use super::chapter::{Chapter, NOTHING, Tone, number, pairs, parameters, table, tone};
 use super::{injection, maps, planned, run, verdicts};
+use crate::planets::speeds::Speeds;
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
-use crate::figures::plot::symbols::{PERIOD_DIGITS, Shown, Speeds, decimals, label, symbol};
+use crate::figures::plot::symbols::{PERIOD_DIGITS, Shown, decimals, label, symbol};
 use crate::model::{Estimate, OrbitQuantity, Parameter, Quoted, definition, quoted_definition};
-use crate::planets::verdict::{SIMULATED_FAP, probability};
+use crate::planets::verdict::{extrapolated, probability};
 use crate::runs::blind_search::{self, PeakRecord, PeriodogramFile};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
@@ -90,10 +91,8 @@ fn search(file: &PeriodogramFile) -> Chapter {
             number(unit.factor * peak.orbit.k_kms, digits_of(Some(unit.factor * peak.orbit.sigma_k_kms), 3)),
             number(unit.factor * peak.orbit.sigma_k_kms, digits_of(Some(unit.factor * peak.orbit.sigma_k_kms), 3)),
             number(peak.orbit.delta_ln_l, 2),
-            match peak.false_alarm_probability {
-                p if p < SIMULATED_FAP => format!("< {SIMULATED_FAP:e}"),
-                p => probability(p),
-            },
+            extrapolated(peak.false_alarm_probability, file.false_alarm.draws)
+                .map_or_else(|| probability(peak.false_alarm_probability), |limit| format!("< {limit}")),
             alias.unwrap_or_else(|| NOTHING.into()),
             peak.rotation.clone().unwrap_or_else(|| NOTHING.into()),
         ]
@@ -143,7 +142,7 @@ fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
     let length = |axis: &Axis| if axis.max > axis.min { axis.max - axis.min } else { axis.max - axis.min + 1.0 };
     let unbounded = axes.iter().find(|axis| estimate(axis).is_some_and(|one| one.error > 0.5 * length(axis)));
     let verdict = match (file.map(|file| &file.refused), unbounded) {
-        (None, _) => (Tone::Doubt, "The landscape is not finished, or has no paraboloid.".to_owned()),
+        (None, _) => (Tone::Doubt, "The likelihood grid is not finished, or has no paraboloid.".to_owned()),
         (Some(Some(why)), _) => (Tone::Doubt, format!("There is no paraboloid: {why}.")),
         (_, Some(axis)) => (
             Tone::Doubt,
@@ -153,7 +152,7 @@ fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
                 label(&axis.name)
             ),
         ),
-        _ => (Tone::Good, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned()),
+        _ => (Tone::Good, "The highest node lies within the likelihood grid, and a paraboloid fits around it.".to_owned()),
     };
     let fit = found.map(|found| {
         pairs(&[
@@ -244,7 +243,7 @@ fn compared(file: &Comparison) -> Chapter {
         false => "The chain has not converged: the comparison is of its draws so far.",
     };
     Chapter {
-        heading: "Chain against landscape".into(),
+        heading: "Chain and likelihood grid".into(),
         verdicts: vec![(tone(file.converged), sentence.into())],
         warnings: file.notes.clone(),
         tables: vec![(

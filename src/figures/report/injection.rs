@@ -2,7 +2,8 @@
 
 use super::chapter::{Chapter, Table, number, pairs};
 use crate::data::io::truth::InjectedTruth;
-use crate::figures::plot::symbols::Speeds;
+use super::chapter::Tone;
+use crate::planets::speeds::Speeds;
 use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;
 
@@ -26,8 +27,7 @@ pub(super) fn limits(file: &LimitsFile) -> Chapter {
     let unit = Speeds::of(&file.k_kms);
     let row = |limit: &Limit| {
         let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
-        let k = |kms: Option<f64>| number(kms.map(|kms| unit.factor * kms), if unit == Speeds::KMS { 3 } else { 0 });
-        vec![number(period_d, 4), number(porb_over_prot, 3), k(k50_kms), k(k95_kms)]
+        vec![number(period_d, 4), number(porb_over_prot, 3), unit.cell(k50_kms), unit.cell(k95_kms)]
     };
     let k = format!("*K* ({}), 50 %", unit.name);
     let head = ["period (d)", "*P*_{orb}/*P*_{rot}", &k, "95 %"].map(str::to_owned).to_vec();
@@ -49,6 +49,7 @@ pub(super) fn limits(file: &LimitsFile) -> Chapter {
     }
     Chapter {
         heading: "Detection limits".into(),
+        verdicts: vec![(Tone::Neutral, file.sentence())],
         tables,
         warnings: file.warnings.clone(),
         diagnostics,

@@ -49,7 +49,8 @@ impl Detection {
         let signal = self.highest().signal(self.frequencies.rotation_period_d);
         match self.not_judged() {
             Some(sentence) => Verdict::not_judged(sentence),
-            None => Verdict::new(self.false_alarm_probability(), signal, remarks).with_periods(self.shares(&|_| true)),
+            None => Verdict::new(self.false_alarm_probability(), self.blind.false_alarm.maxima.len(), signal, remarks)
+                .with_periods(self.shares(&|_| true)),
         }
     }
 

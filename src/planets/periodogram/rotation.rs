@@ -37,12 +37,12 @@ pub struct Imitation {
 }
 
 impl Imitation {
-    /// `Prot`, `Prot/3`, `2 Prot`.
+    /// `P_rot`, `P_rot/3`, `2 P_rot`.
     pub fn period(&self) -> String {
         match (self.numerator, self.denominator) {
-            (1, 1) => "Prot".to_owned(),
-            (1, n) => format!("Prot/{n}"),
-            (n, _) => format!("{n} Prot"),
+            (1, 1) => "P_rot".to_owned(),
+            (1, n) => format!("P_rot/{n}"),
+            (n, _) => format!("{n} P_rot"),
         }
     }
 
@@ -52,7 +52,7 @@ impl Imitation {
         self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
     }
 
-    /// In a few words: `consistent with 2 Prot`, `alias of Prot/3 at 1.003/d`.
+    /// In a few words: `consistent with 2 P_rot`, `alias of P_rot/3 at 1.003/d`.
     pub fn words(&self, rotation_period_d: f64) -> String {
         match &self.alias {
             None => format!("consistent with {}", self.period()),
@@ -136,9 +136,9 @@ mod tests {
         let periods = RotationPeriods::new(&cycles, rotation_period_d, &[], base);
         assert!(periods.window.iter().any(|peak| (peak.frequency - rotation_period_d).abs() < 1e-12), "{periods:?}");
         let words = |period: f64, sigma: f64| periods.imitated(period, Some(sigma)).map(|i| i.words(rotation_period_d));
-        assert_eq!(words(1.985, 0.007).as_deref(), Some("consistent with 2 Prot"));
-        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("alias of Prot at 1.000/d"));
-        assert_eq!(words(0.501, 0.0003).as_deref(), Some("consistent with Prot/2"));
+        assert_eq!(words(1.985, 0.007).as_deref(), Some("consistent with 2 P_rot"));
+        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("alias of P_rot at 1.000/d"));
+        assert_eq!(words(0.501, 0.0003).as_deref(), Some("consistent with P_rot/2"));
         assert_eq!(words(1.45, 0.004), None);
     }
 

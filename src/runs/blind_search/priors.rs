@@ -5,7 +5,7 @@ use crate::inference::detection::Detection;
 use crate::model::{Elements, Parameter, Prior, period_prior};
 use crate::planets::periodogram::window::is_same_frequency;
 use crate::planets::periodogram::{CircularOrbit, Imitation, Row};
-use crate::planets::verdict::{Finding, Remark, Signal, Verdict, decimals};
+use crate::planets::verdict::{Finding, Remark, Signal, Verdict, decimals, speed};
 
 /// The verdict on what the priors of `scene` allow; remarks on other orbits leave, and what they do not allow joins.
 pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, remarks: &mut Vec<Remark>) -> Verdict {
@@ -29,12 +29,15 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
     }
     verdict = verdict.with_periods(found.shares(&|ratio| periods.contain(ratio)));
     let prior = scene.settings.free.iter().find(|f| f.parameter == Parameter::K).map(|f| f.prior);
-    if let Some((Signal { k_kms, .. }, prior)) = verdict.signal.zip(prior).filter(|(s, prior)| !prior.contains(s.k_kms))
+    if let Some((Signal { k_kms, sigma_k_kms, .. }, prior)) = verdict.signal.zip(prior).filter(|(s, prior)| !prior.contains(s.k_kms))
     {
         let (low, high) = prior.bounds();
         let outside = Remark::against(
             "K outside its prior",
-            format!("K = {k_kms:.3} km/s of the blind search lies outside the prior of k_kms ({low} to {high})."),
+            format!(
+                "K = {} of the blind search lies outside the prior of k_kms ({low} to {high} km/s).",
+                speed(k_kms, sigma_k_kms)
+            ),
         );
         verdict = verdict.with(std::slice::from_ref(&outside));
         remarks.push(outside);
@@ -84,5 +87,6 @@ fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict 
     let remarks: Vec<Remark> = remarks.iter().cloned().chain(words.map(|words| Remark::against(words, ""))).collect();
     let CircularOrbit { k_kms, sigma_k_kms, delta_ln_l, .. } = orbit;
     let signal = Signal { period_d: rotation_period_d * porb_over_prot, sigma_period_d, k_kms, sigma_k_kms };
-    Verdict::new(found.blind.false_alarm.probability(delta_ln_l).value(), signal, &remarks)
+    let alarm = &found.blind.false_alarm;
+    Verdict::new(alarm.probability(delta_ln_l).value(), alarm.maxima.len(), signal, &remarks)
 }

@@ -9,7 +9,7 @@ use super::record::{
 use crate::inference::detection::HeldOut;
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
-use crate::planets::verdict::{SIMULATED_FAP, decimals, false_alarm, probability, speed};
+use crate::planets::verdict::{decimals, extrapolated, false_alarm, probability, speed};
 use crate::surface::ConstantVelocity;
 
 /// Peaks shown; the file has the others.
@@ -59,7 +59,7 @@ impl PeriodogramFile {
         if let Some(evidence) = &self.evidence {
             text += &format!("evidence: {}\n", evidence.sentence);
         }
-        text += &peaks(&self.peaks);
+        text += &peaks(&self.peaks, self.false_alarm.draws);
         if let Some(Some(orbit)) = self.keplerian.as_ref().and_then(|orbits| orbits.first()) {
             text += &eccentric(orbit);
         }
@@ -67,7 +67,7 @@ impl PeriodogramFile {
             text += &format!("second planet: {}\n", chance(&second.false_alarm));
             match &second.orbits {
                 Some(both) => text += &self.orbits(both, &["first", "second"].map(str::to_owned), rotation_period_d),
-                None => text += &peaks(&second.peaks),
+                None => text += &peaks(&second.peaks, second.false_alarm.draws),
             }
         }
         text += &robustness(&self.robustness);
@@ -228,17 +228,17 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
     format!(
         "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations{offsets}, N_ind ≈ {independent_periods:.0})\n\
         Thresholds at FAP = 10, 1, 0.1 %: {}",
-        false_alarm(*p),
+        false_alarm(*p, *draws),
         levels.join(", ")
     )
 }
 
 /// A false-alarm probability in a table: beyond the simulations an upper limit.
-fn short(p: f64) -> String {
-    if p < SIMULATED_FAP { format!("< {SIMULATED_FAP:e}") } else { probability(p) }
+fn short(p: f64, draws: usize) -> String {
+    extrapolated(p, draws).map_or_else(|| probability(p), |limit| format!("< {limit}"))
 }
 
-fn peaks(peaks: &[PeakRecord]) -> String {
+fn peaks(peaks: &[PeakRecord], draws: usize) -> String {
     let head = ["peak", "period_d", "porb_over_prot", "k_kms", "sigma", "delta_ln_l", "FAP", ""];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (k, peak) in peaks.iter().enumerate().take(SHOWN) {
@@ -259,7 +259,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
             format!("{k_kms:.digits$}"),
             format!("{sigma_k_kms:.digits$}"),
             format!("{delta_ln_l:.2}"),
-            short(peak.false_alarm_probability),
+            short(peak.false_alarm_probability, draws),
             notes.join(", "),
         ]);
     }

@@ -10,7 +10,8 @@ use crate::data::io::provenance::Provenance;
 use crate::data::io::saved::Saved;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::Search;
-use crate::planets::verdict::{CANDIDATE_FAP, decimals, false_alarm, probability, speed};
+use crate::planets::speeds::Speeds;
+use crate::planets::verdict::{CANDIDATE_FAP, decimals, false_alarm, probability, speed, usual_draws};
 use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -76,6 +77,9 @@ pub struct BeforeRecord {
     pub delta_ln_l: f64,
     /// Its false-alarm probability.
     pub false_alarm_probability: f64,
+    /// Number of simulations that it comes from.
+    #[serde(default = "usual_draws")]
+    pub draws: usize,
 }
 
 impl LimitsFile {
@@ -91,6 +95,7 @@ impl LimitsFile {
         let of = |search: &Search| {
             let best = search.best();
             BeforeRecord {
+                draws: search.false_alarm.maxima.len(),
                 period_d: rotation_period_d * best.porb_over_prot,
                 delta_ln_l: best.orbit.delta_ln_l,
                 false_alarm_probability: search.false_alarm.probability(best.orbit.delta_ln_l).value(),
@@ -169,32 +174,52 @@ impl LimitsFile {
         })
     }
 
+    /// Medians over the periods of what would have been found.
+    pub fn sentence(&self) -> String {
+        let unit = Speeds::of(&self.k_kms);
+        let typical = |of: fn(&Limit) -> Option<f64>| {
+            let mut k: Vec<f64> = self.limits.iter().map(|limit| of(limit).unwrap_or(f64::INFINITY)).collect();
+            k.sort_by(f64::total_cmp);
+            Some(k[k.len() / 2]).filter(|k| k.is_finite())
+        };
+        let beyond = || format!("above {} {}", unit.cell(self.k_kms.last().copied()), unit.name);
+        let words = |k: Option<f64>| k.map_or_else(beyond, |k| format!("{} {}", unit.cell(Some(k)), unit.name));
+        format!(
+            "Detection limits: K = {} at 50 %, {} at 95 % of the phases (medians over {} periods).",
+            words(typical(|limit| limit.k50_kms)),
+            words(typical(|limit| limit.k95_kms)),
+            self.limits.len()
+        )
+    }
+
     /// A table of some of the periods, and what may be wrong.
     pub fn table(&self) -> String {
-        let mut rows = vec![["period_d", "porb_over_prot", "K 50 %", "K 95 %"].map(str::to_owned).to_vec()];
+        let unit = Speeds::of(&self.k_kms);
+        let head = ["period_d", "porb_over_prot", &format!("K 50 % ({})", unit.name), "K 95 %"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
         let step = self.limits.len().div_ceil(SHOWN).max(1);
-        let shown = |k: Option<f64>| k.map_or_else(|| "-".to_owned(), |k| format!("{k:.4}"));
         for limit in self.limits.iter().step_by(step) {
             let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
-            rows.push(vec![format!("{period_d:.4}"), format!("{porb_over_prot:.4}"), shown(k50_kms), shown(k95_kms)]);
+            let k = [k50_kms, k95_kms].map(|k| unit.cell(k));
+            rows.push([vec![format!("{period_d:.4}"), format!("{porb_over_prot:.4}")], k.to_vec()].concat());
         }
-        let mut text = aligned(&rows);
+        let mut text = self.sentence() + "\n" + &aligned(&rows);
         let shown = match step {
             1 => String::new(),
             _ => format!("; {} of {} periods, all are in {CSV}", self.limits.len().div_ceil(step), self.limits.len()),
         };
         text += &format!(
-            "K (km/s) recovered (FAP < {} %, right period) at 50 and 95 % of {} phases{shown}\n",
+            "K recovered (FAP < {} %, right period) at 50 and 95 % of {} phases{shown}\n",
             100.0 * self.false_alarm_probability,
             self.phases
         );
         if let Some(orbit) = self.removed {
-            let BeforeRecord { period_d, false_alarm_probability, .. } = self.before;
+            let BeforeRecord { period_d, false_alarm_probability, draws, .. } = self.before;
             let digits = decimals(0.01 * period_d);
             text += &format!(
                 "subtracted first: signal of P = {period_d:.digits$} d, K = {} ({})\n",
                 speed(-orbit.k_kms, 0.1 * orbit.k_kms.abs()),
-                false_alarm(false_alarm_probability)
+                false_alarm(false_alarm_probability, draws)
             );
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) = self.agreement {

@@ -6,6 +6,7 @@ use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::data::io::saved::Saved;
 use crate::numerics::text::{aligned, escaped};
+use crate::planets::speeds::Speeds;
 use crate::planets::verdict::{CANDIDATE_FAP, speed};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -220,11 +221,13 @@ impl PlanFile {
     }
 
     fn comparison(&self) -> String {
-        let head = ["schedule", "nights", "profiles", "time base (d)", "sigma_K", "K 50 %", "K 95 %"];
+        let unit = unit(self.schedules.iter().filter_map(ScheduleRecord::whole));
+        let sigma = format!("sigma_K ({})", unit.name);
+        let head = ["schedule", "nights", "profiles", "time base (d)", &sigma, "K 50 %", "K 95 %"];
         let row = |schedule: &ScheduleRecord| {
             let whole = schedule.whole();
             let count = |number: fn(&AfterRecord) -> usize| whole.map_or_else(|| "-".into(), |w| number(w).to_string());
-            let k = |number: fn(&AfterRecord) -> Option<f64>| shown(whole.and_then(number));
+            let k = |number: fn(&AfterRecord) -> Option<f64>| unit.cell(whole.and_then(number));
             vec![
                 escaped(&schedule.name).into_owned(),
                 count(|w| w.nights),
@@ -236,7 +239,7 @@ impl PlanFile {
             ]
         };
         let rows = std::iter::once(head.map(str::to_owned).to_vec()).chain(self.schedules.iter().map(row));
-        aligned(&rows.collect::<Vec<_>>()) + "sigma_K and K (km/s): medians over all periods\n"
+        aligned(&rows.collect::<Vec<_>>()) + "sigma_K and K: medians over all periods\n"
     }
 }
 
@@ -297,9 +300,10 @@ impl ScheduleRecord {
         let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms, .. } = self.spots;
         let lives = spot_lifetime_d.map_or("static".into(), |d| format!("lifetime {d:.1} d"));
         let mut text = format!(
-            "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); RV jitter \
-            {velocity_jitter_kms:.4} km/s; S/N {:.0}\n",
+            "spots {lives}, amplitude {spot_amplitude:.2}, power-law index {spot_slope:.2} ({}); RV jitter \
+            {}; S/N {:.0}\n",
             source.words(),
+            speed(velocity_jitter_kms, 0.01),
             self.snr
         );
         for SetRecord { name, taken, planned, nights, snr } in &self.sets {
@@ -310,16 +314,19 @@ impl ScheduleRecord {
             text += &format!("{name}: {bins} bins{}\n", if *planned { " planned" } else { "" });
         }
         text.push('\n');
-        let head = ["nights", "profiles", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
+        let unit = unit(&self.after);
+        let sigma = format!("sigma_K ({})", unit.name);
+        let head = ["nights", "profiles", &sigma, "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
         let row = |after: &AfterRecord| {
             let counts = [after.nights, after.profiles].map(|n| n.to_string());
-            counts.into_iter().chain([after.sigma_k_kms, after.k50_kms, after.k95_kms].map(shown)).collect()
+            let numbers = [after.sigma_k_kms, after.k50_kms, after.k95_kms].map(|k| unit.cell(k));
+            counts.into_iter().chain(numbers).collect()
         };
         text += &aligned(&std::iter::once(head).chain(self.after.iter().map(row)).collect::<Vec<_>>());
-        text += "medians over all periods (km/s)\n\n";
-        let head = ["period_d", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
+        text += "medians over all periods\n\n";
+        let head = ["period_d", &sigma, "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
         let row = |at: &ExpectedRecord| {
-            let numbers = [at.sigma_k_kms, at.k50_kms, at.k95_kms].map(shown);
+            let numbers = [at.sigma_k_kms, at.k50_kms, at.k95_kms].map(|k| unit.cell(k));
             std::iter::once(format!("{}", at.period_d)).chain(numbers).collect()
         };
         text + &aligned(&std::iter::once(head).chain(self.periods.iter().map(row)).collect::<Vec<_>>())
@@ -331,11 +338,10 @@ impl ScheduleRecord {
         for at in self.periods.iter().filter(|at| SPOKEN_D.contains(&at.period_d)) {
             if let (Some(k50), Some(k95)) = (at.k50_kms, at.k95_kms) {
                 sentences.push(format!(
-                    "A planet of K = {} km/s and {} d would be detected with 95 % probability, one of {} km/s with 50 \
-                    %.",
-                    two_digits(k95),
+                    "A planet of K = {} and {} d would be detected with 95 % probability, one of {} with 50 %.",
+                    speed(k95, 0.1 * k95),
                     at.period_d,
-                    two_digits(k50)
+                    speed(k50, 0.1 * k50)
                 ));
             }
         }
@@ -408,12 +414,8 @@ impl Choice {
     }
 }
 
-fn shown(k: Option<f64>) -> String {
-    k.map_or_else(|| "-".to_owned(), |k| format!("{k:.4}"))
-}
-
-/// To two digits.
-fn two_digits(x: f64) -> String {
-    let decimals = (1.0 - x.abs().max(1e-9).log10().floor()).clamp(0.0, 12.0) as usize;
-    format!("{x:.decimals$}")
+/// The unit of K in tables of these.
+fn unit<'a>(after: impl IntoIterator<Item = &'a AfterRecord>) -> Speeds {
+    let all = after.into_iter().flat_map(|after| [after.sigma_k_kms, after.k50_kms, after.k95_kms]);
+    Speeds::of(&all.flatten().collect::<Vec<_>>())
 }

@@ -1,5 +1,5 @@
-//! Who reconstructs: the threads of this machine, or the ranks of a cluster. A batch of parameter vectors in, answers
-//! out, in the order of the questions, so that nobody can tell from the results who it was.
+//! Evaluates batches of parameter vectors on threads or MPI ranks. Answers are in the order of the questions; results
+//! are independent of the backend.
 //!
 //! `target` passes a vector to the density of the surface model, `task` what another process must know to evaluate the
 //! same to the bit, `message` questions and answers as bytes.

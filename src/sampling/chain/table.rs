@@ -104,7 +104,7 @@ fn convergence(summary: &Summary) -> String {
     match (summary.converged, advice.is_empty()) {
         (true, true) => "Chain converged".to_owned(),
         (true, false) => format!("Chain converged, but {advice}"),
-        (false, _) => format!("Chain NOT converged: {advice}"),
+        (false, _) => format!("Not converged: do not quote intervals. {advice}"),
     }
 }
 
@@ -113,7 +113,7 @@ fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
     let interval = |[low, high]: [f64; 2]| format!("[{}, {}]", number(low, digits), number(high, digits));
     let optional =
         |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
-    let median = if one.unconstrained { "any".to_owned() } else { number(one.median, digits) };
+    let median = if one.unconstrained { "-".to_owned() } else { number(one.median, digits) };
     let side = |width: f64| if one.unconstrained { "-".to_owned() } else { number(width, digits) };
     // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped
     // estimate.

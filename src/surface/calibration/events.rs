@@ -63,7 +63,7 @@ impl Events {
         self.too_many.map(|[events, all]| {
             format!(
                 "{events} of {all} profiles are outliers (too-many-events): the model or observations.sigma_scale is \
-                wrong; to keep all profiles as they are, set observations.events to \"none\""
+                wrong; to change no uncertainties set observations.events to \"none\""
             )
         })
     }

@@ -45,14 +45,14 @@ impl ChosenTarget {
         let left = 100.0 * (1.0 - self.left_by_doubling);
         let ChosenTarget { value, filtered_rv_rms_kms, .. } = self;
         let still = match (self.still_shrinking, self.never_shrinking) {
-            (true, _) => "; they still shrink there: errors are too large, or the model of the star lacks something",
-            (false, true) => "; spots do not make them shrink at all, so that they tell no target: give a number",
+            (true, _) => "; still decreasing there: uncertainties are too large, or the stellar model is incomplete",
+            (false, true) => "; it does not decrease with more spots: give a number",
             (false, false) => "",
         };
         format!(
-            "{value} per datum; velocities left over {filtered_rv_rms_kms:.4} km/s rms, {left:.0} % less with twice \
-            the weight of \
-             the data{still}"
+            "{value} per datum; filtered residual RV rms {:.0} m/s, {left:.0} % less with twice the weight of the \
+             data{still}",
+            1000.0 * filtered_rv_rms_kms
         )
     }
 }

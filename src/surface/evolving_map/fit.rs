@@ -47,11 +47,11 @@ pub struct Fitted {
 /// Why there is no most probable field.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoFit {
-    /// The field cannot be integrated over.
+    /// The field cannot be marginalised over.
     #[error(transparent)]
     Field(#[from] FieldError),
     /// The density of the data is no number.
-    #[error("the evidence of the most probable field is not finite; data or errors are beyond sense")]
+    #[error("the evidence of the most probable field is not finite: check intensities and uncertainties")]
     NotFinite,
 }
 

@@ -181,15 +181,15 @@ pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
                 named.push(format!("and {} more", wild.len() - NAMED));
             }
             all.push(format!(
-                "light curve {name}: no noise puts bins as far from the maps as at {}: flares, transits or bad \
-                 measurements, whose times photometry.exclude leaves out",
+                "light curve {name}: outliers at {} (flares, transits or bad measurements): exclude their times by \
+                 photometry.exclude",
                 named.join(", ")
             ));
         } else if chi2 > WORST_CHI2 {
             let factor = chi2.sqrt();
             all.push(format!(
-                "light curve {name}: chi2 is {chi2:.1} per bin: it has what neither spots nor its errors explain; \
-                 photometry.sigma_scale {factor:.1} makes the errors as large"
+                "light curve {name}: χ² = {chi2:.1} per bin, more than spots and uncertainties explain; \
+                 photometry.sigma_scale {factor:.1} brings it to 1"
             ));
         }
     }

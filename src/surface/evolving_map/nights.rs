@@ -131,7 +131,7 @@ fn far(times_d: &[f64], observations: &Observations, kernel: &Kernel) -> Option<
     let [first, last] = observations.time_span_d()?;
     (!far.is_empty()).then(|| {
         format!(
-            "the profiles, of {first:.2} to {last:.2} d, tell little of the star at {} d: spots do not live that long",
+            "the profiles ({first:.2} to {last:.2} d) hardly constrain the map at {} d: spots do not live that long",
             far.join(", ")
         )
     })

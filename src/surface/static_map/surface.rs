@@ -126,24 +126,24 @@ impl SurfaceModel for StaticMap {
             remarks.push(Remark::against(
                 "no map fits to the target chi2",
                 format!(
-                    "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots \
-                    ({chi2:.3} was reached): the target may be too low, or the model of the star wrong"
+                    "no map reaches the target χ²/N of {target:.3} without fitting noise ({chi2:.3} reached): the target \
+                    may be too low, or the stellar model wrong"
                 ),
             ));
         } else if far.abs() > FAR {
             remarks.push(Remark::against(
                 "chi2 is far from 1",
                 format!(
-                    "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or \
-                    the model of the star may be wrong, and all errors here with them"
+                    "χ²/N = {chi2:.3}, {far:+.1}σ from 1: the uncertainties of the profiles or the stellar model may be \
+                    wrong, and all uncertainties here with them"
                 ),
             ));
         }
         if here.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
             remarks.push(Remark::against(
-                "the model of the star is wrong",
-                "the profiles have nothing to do with the model of the star: what the map leaves over is without \
-                 bounds",
+                "the stellar model is wrong",
+                "The stellar model cannot reproduce the profiles (unbounded residual variance): check star.vsini_kms \
+                 and star.line.",
             ));
         }
         remarks
@@ -157,8 +157,7 @@ impl SurfaceModel for StaticMap {
     ) -> Result<SurfaceMaps, NoMaps> {
         if times_d.is_some() {
             return Err(NoMaps::Times(
-                "the map does not change with the imaging.objective of the config; maps that do take \
-                 \"marginal-likelihood\"",
+                "static maps have no times: set imaging.objective to \"marginal-likelihood\" for evolving maps",
             ));
         }
         let reference = Reference::build(imager, values, self.chi2_target)?;

@@ -333,7 +333,7 @@ fn star_of(
     if let Some(wavelength_nm) = wavelength_nm {
         held(Parameter::Contrast, "wavelength_nm")?;
         if contrast.is_some() || own.contrast.is_some() {
-            let problem = "a contrast is given, which knows no wavelength: give star.photosphere_k and .spot_k instead";
+            let problem = "star.contrast does not depend on wavelength: give star.photosphere_k and .spot_k instead";
             return Err(Fault::new(format!("{key}.wavelength_nm"), problem));
         }
         own.wavelength_nm = *wavelength_nm;

@@ -95,7 +95,7 @@ fn band(written: &Config, section: &PhotometrySection, key: &str) -> Result<Band
             Some(contrast(&own).map_err(at_key)?)
         }
         (None, Some(_)) if own.contrast.is_some() => {
-            let problem = "star.contrast knows no wavelength: give star.photosphere_k and .spot_k instead";
+            let problem = "star.contrast does not depend on wavelength: give star.photosphere_k and .spot_k instead";
             return Err(Fault::new(format!("{key}.wavelength_nm"), problem));
         }
         (None, Some(wavelength_nm)) => {

@@ -87,10 +87,10 @@ impl MeasuredJitter {
         let alone = scatter(&self.without_planet);
         let Some(orbit) = &self.beside_orbit else { return format!("{alone} (no planet)") };
         let beside = format!(
-            "{} with the best orbit (P = {:.4} P_rot, K = {:.4} km/s, ln B = {:.1})",
+            "{} with the best orbit (P = {:.4} P_rot, K = {:.0} m/s, ln B = {:.1})",
             scatter(&orbit.scatter),
             orbit.porb_over_prot,
-            orbit.k_kms,
+            1000.0 * orbit.k_kms,
             orbit.ln_odds
         );
 
@@ -109,8 +109,7 @@ pub enum JitterError {
     Reference(#[from] ReferenceError),
     /// Velocities without bounds, or none at all.
     #[error(
-        "\"fitted\" takes three profiles or more whose velocities the data bound: give a number (0 for zero points \
-         that are exact)"
+        "\"fitted\" needs three profiles with constrained RVs: give a number (0: stable spectrograph)"
     )]
     Unbounded,
 }
