@@ -57,34 +57,34 @@ pub struct KnownArgs {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Rotation period (d)
-    #[arg(long, value_name = "DAYS")]
+    #[arg(long, value_name = "DAYS", allow_negative_numbers = true)]
     rotation_period: Option<f64>,
     /// Time of rotation cycle 0 (d); the middle of the observations if not given
     #[arg(long, value_name = "DAYS", allow_negative_numbers = true)]
     epoch: Option<f64>,
     /// Inclination of the rotation axis to the line of sight (degrees)
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     inclination: Option<f64>,
     /// Projected rotation velocity (km/s), in place of the measured one
-    #[arg(long, value_name = "KMS")]
+    #[arg(long, value_name = "KMS", allow_negative_numbers = true)]
     vsini: Option<f64>,
     /// Differential rotation: equator minus pole (rad/d)
     #[arg(long, value_name = "RAD/D", allow_negative_numbers = true)]
     domega: Option<f64>,
     /// Coefficient of linear limb darkening
-    #[arg(long, value_name = "U")]
+    #[arg(long, value_name = "U", allow_negative_numbers = true)]
     limb_darkening: Option<f64>,
     /// Temperature of the photosphere (K)
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
     photosphere: Option<f64>,
     /// Temperature of the spots (K)
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
     spot: Option<f64>,
     /// Wavelength of the profiles (nm); for several lists one each, separated by commas
     #[arg(long, value_name = "NM", value_delimiter = ',')]
     wavelength: Vec<f64>,
     /// Standard deviation of the local line (km/s), before instrumental broadening
-    #[arg(long, value_name = "KMS")]
+    #[arg(long, value_name = "KMS", allow_negative_numbers = true)]
     line_sigma: Option<f64>,
     /// Spectrograph, such as ESPaDOnS, SPIRou or HARPS: its resolving power and wavelength, where these are not given;
     /// for several lists one each, separated by commas
@@ -409,10 +409,12 @@ pub fn next_commands(proposal: &Proposal, path: &Path) {
     let config = shown(path);
     let next = match proposal.complete {
         true => format!(
-            "next:\n  dimcmc map {config} --out map               does the model fit? is the map plausible?\n  dimcmc \
-            periodogram \
-             {config} --out search    is there a planet at all?\n  dimcmc sample {config} --out run            the \
-             posterior\n"
+            "next:\n  \
+             dimcmc map {config} --out map               does the model fit? is the map plausible?\n  \
+             dimcmc periodogram {config} --out search    is there a planet, and at which period?\n  \
+             dimcmc limits {config} --out limits         which planets would have been detected?\n  \
+             dimcmc sample {config} --out run            the posterior\n  \
+             dimcmc report map search limits run         one HTML page of all of it\n"
         ),
         false => format!("next: correct {config} as the notes say, then\n  dimcmc map {config} --out map\n"),
     };

@@ -57,14 +57,17 @@ struct Cli {
     command: Command,
 }
 
+/// Where `--help` has them.
+const GENERAL: &str = "General options";
+
 /// Options of every command.
 #[derive(Debug, clap::Args)]
 pub struct Global {
     /// Number of threads; all processors if not given, one per MPI rank on a cluster. Results do not depend on it
-    #[arg(long, global = true, value_name = "N", value_parser = threads)]
+    #[arg(long, global = true, value_name = "N", value_parser = threads, help_heading = GENERAL)]
     threads: Option<NonZeroUsize>,
     /// No progress bar
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = GENERAL)]
     quiet: bool,
     #[cfg(feature = "mpi")]
     #[arg(skip)]

@@ -229,10 +229,7 @@ const PERIOD: Spec = Spec { unit: "d", most: most::TIME, step: Step::Period(0.02
 
 const PHASE: Spec = Spec {
     unit: "cycles",
-    definition: Some(
-        "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a maximum at \
-         star.epoch_d",
-    ),
+    definition: Some("time from star.epoch_d to the next RV maximum, in orbital cycles"),
     values: ANY,
     widest: (0.0, 1.0),
     priors: &[Periodic, Uniform],

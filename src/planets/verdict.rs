@@ -226,8 +226,7 @@ impl Verdict {
         shares.retain(|of| of.share >= LEAST_SHARE);
         shares.truncate(MOST_PERIODS);
         self.periods = if is_clear || shares.len() < 2 { Vec::new() } else { shares };
-        self.sentence =
-            sentence(self.finding, &chance(probability, self.draws), &signal, &self.against, &self.periods);
+        self.sentence = sentence(self.finding, &chance(probability, self.draws), &signal, &self.against, &self.periods);
         self
     }
 
@@ -276,13 +275,7 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
     )
 }
 
-fn sentence(
-    finding: Finding,
-    chance: &str,
-    signal: &Signal,
-    against: &[String],
-    periods: &[PeriodShare],
-) -> String {
+fn sentence(finding: Finding, chance: &str, signal: &Signal, against: &[String], periods: &[PeriodShare]) -> String {
     let ambiguous = match (finding.is_signal(), periods) {
         (false, _) | (true, []) => String::new(),
         (true, periods) => {

@@ -4,13 +4,13 @@
 use crate::data::calibrated::suspects;
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::atomic::WriteError;
-use crate::data::io::map::{self, MapResult};
+use crate::data::io::map::{self, MAP, MapResult};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
 use crate::inference::detection::{KnownPlanets, PlanetFree};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
-use crate::planets::verdict::{CANDIDATE_FAP, false_alarm};
+use crate::planets::verdict::{CANDIDATE_FAP, false_alarm, speed};
 use crate::runs::blind_search::BlindSearchOptions;
 use crate::surface::expansion::{Nuisance, nuisances};
 use crate::surface::maps::{Deviation, ImageSummary};
@@ -123,7 +123,7 @@ impl<'a> Maps<'a> {
         MapResult { imager, observations, maps, true_map, truth, diagnosis, provenance }.write(folder)
     }
 
-    /// How good the fit is and what warns of it, label and text a line.
+    /// What warns of the fit and how good it is, with label and text per line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let Maps { scene, maps, diagnosis, .. } = self;
         let text = diagnosis.as_ref().map(|diagnosis| diagnosis.text.clone());
@@ -134,9 +134,9 @@ impl<'a> Maps<'a> {
             (None, None) => scene.measured.misfit_text(),
         };
         let warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().chain(misfit);
-        let mut lines = numbers(maps);
+        let mut lines: Vec<_> = warnings.map(|text| ("warning", text)).collect();
+        lines.extend(numbers(maps));
         lines.extend(self.measured().lines());
-        lines.extend(warnings.map(|text| ("warning", text)));
         lines
     }
 
@@ -195,7 +195,7 @@ impl FreeVelocities {
         let signal = peak.signal(scene.imager.star.rotation_period_d);
         let absorbed = match jitter_kms {
             0.0 => String::new(),
-            kms => format!("; the RV jitter of {kms:.3} km/s absorbs it"),
+            kms => format!("; the RV jitter of {} absorbs it", metres(kms)),
         };
         Some(format!(
             "{AS_ORBIT} ({}, {}){absorbed}: run `dimcmc periodogram {}`.",
@@ -233,28 +233,29 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     }
     lines.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
     lines.push(("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core)));
-    lines.push(("RV observed", format!("{:.4} km/s rms", fit.observed_rv_rms_kms)));
+    lines.push(("RV observed", format!("{} rms", metres(fit.observed_rv_rms_kms))));
     if let Some(filtered) = fit.filtered_rv_rms_kms {
         let filtered = match (nuisances.is_empty(), zero_points_kms.is_empty()) {
-            (true, true) => format!("{filtered:.4} km/s rms"),
+            (true, true) => format!("{} rms", metres(filtered)),
             (true, false) => "n/a (degenerate with the fitted RV offsets)".to_owned(),
             (false, _) => "n/a (degenerate with the fitted continuum)".to_owned(),
         };
         lines.push(("RV filtered", filtered));
-        lines.push(("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms)));
+        lines.push(("RV error", format!("{} (photon noise)", metres(fit.photon_rv_error_kms))));
     }
     if let Some((rms, error)) = fit.rv_rms_kms.zip(fit.rv_error_kms) {
         let jitter_kms = field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);
         let counted = match jitter_kms {
             0.0 => String::new(),
-            kms => format!(", RV jitter of {kms:.4} km/s included"),
+            kms => format!(", RV jitter of {} included", metres(kms)),
         };
-        lines.push(("RV corrected", format!("{rms:.4} km/s rms, uncertainty {error:.4} km/s (correlated){counted}")));
+        let text = format!("{} rms, uncertainty {} (correlated){counted}", metres(rms), metres(error));
+        lines.push(("RV corrected", text));
     }
     let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
     if !zero_points_kms.is_empty() {
         let squares = zero_points_kms.iter().map(|v| v * v).sum();
-        lines.push(("fitted jitter", format!("{:.4} km/s rms", rms(squares, zero_points_kms.len()))));
+        lines.push(("RV shifts", format!("{} rms (of single profiles)", metres(rms(squares, zero_points_kms.len())))));
     }
     if !nuisances.is_empty() {
         let [offset, slope, width] =
@@ -262,11 +263,16 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
         let width = 100.0 * width;
         lines.push(("continuum", format!("offset {offset:.1e}, slope {slope:.1e}, equivalent width {width:.2} % rms")));
     }
-    let times: Vec<String> = maps.maps.iter().filter_map(|map| Some(format!("{:.3}", map.time_d?))).collect();
-    if !times.is_empty() {
-        lines.push(("maps at", format!("{} d", times.join(", "))));
+    let times: Vec<f64> = maps.maps.iter().filter_map(|map| map.time_d).collect();
+    if let [first, .., last] = times[..] {
+        lines.push(("maps", format!("{} from {first:.3} to {last:.3} d (times in {MAP})", times.len())));
     }
     lines
+}
+
+/// A velocity to 1 m/s, or to 1 m/s in km/s from 1 km/s on.
+fn metres(kms: f64) -> String {
+    speed(kms, 0.01)
 }
 
 /// Those of a field.
@@ -276,7 +282,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         ("amplitude", format!("{} (SD of the spot filling factor){}", field.amplitude(), caveat("spot_amplitude"))),
         ("power-law index", format!("{} ({}){}", field.slope(), field.spectrum(), caveat("spot_slope"))),
         ("lifetime", field.lifetime() + &caveat("spot_lifetime_d")),
-        ("RV jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
+        ("RV jitter", metres(field.velocity_jitter_kms)),
         ("ln Z", format!("{:.2}", field.ln_evidence)),
     ]
 }

@@ -76,8 +76,11 @@ const KINDS: [(&str, &str); 11] = [
 
 /// What a folder is instead of what was looked for.
 fn instead(folder: &Path) -> String {
+    if !folder.exists() {
+        return "no such folder".to_owned();
+    }
     match KINDS.iter().find(|(file, _)| folder.join(file).is_file()) {
-        Some((file, command)) => format!("this folder is of `dimcmc {command}` ({file} is there)"),
+        Some((file, command)) => format!("this folder has results of `dimcmc {command}` ({file})"),
         None => "this folder holds no results yet".to_owned(),
     }
 }

@@ -92,7 +92,9 @@ impl FieldRecord {
             let bound = [low, high].into_iter().find(|bound| near(*bound))?;
             Some(match (p, bound == high) {
                 (Parameter::SpotLifetime, true) => "no spot evolution detected".to_owned(),
-                _ => format!("{} is at its search bound, {bound}: unconstrained, or the model is misspecified", p.name()),
+                _ => {
+                    format!("{} is at its search bound, {bound}: unconstrained, or the model is misspecified", p.name())
+                }
             })
         };
         Parameter::FIELD.iter().filter_map(on_bound).chain(self.widened(free)).collect()

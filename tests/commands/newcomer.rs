@@ -266,7 +266,7 @@ fn a_wrong_rotation_period_is_named() {
     assert!(!right.contains("star.rotation_period_d"), "{right}");
     for args in [&["periodogram", "--draws", "1000"][..], &["map"]] {
         let told = desk.succeed(&[&[args[0], "wrong.json", "--out", args[0]], &args[1..]].concat());
-        says(&told, &["the rotation period is 2.", "rather than 2.530 d", "set star.rotation_period_d"]);
+        says(&told, &["a rotation period of 2.", "fits better than 2.530 d", "correct star.rotation_period_d"]);
     }
     let found = desk.json("periodogram/periodogram.json");
     assert_eq!(found["verdict"]["finding"], "not-judged");

@@ -13,7 +13,7 @@ const PROT: f64 = 3.0;
 const EPOCH: f64 = 2_459_000.5;
 
 /// What a summary, a table and a page say of phi.
-const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity";
+const PHI: &str = "time from star.epoch_d to the next RV maximum, in orbital cycles";
 
 /// A star of known mass with a planet, its orbit free.
 fn config() -> Value {

@@ -158,7 +158,7 @@ fn what_is_no_run_is_neither_resumed_nor_analysed() {
     desk.refusal(&["sample", CONFIG, "--out", "run"]);
     desk.write("empty/map.json", "{}");
     for command in [&["analyse", "empty"][..], &["export", "empty", "--format", "csv"]] {
-        says(&desk.refusal(command), &["empty: no manifest.json: this folder is of `dimcmc map`"]);
+        says(&desk.refusal(command), &["empty: no manifest.json: this folder has results of `dimcmc map`"]);
     }
 
     copy(&desk, "run", "corrupt");

@@ -196,11 +196,11 @@ fn by_hand_wrong_rotation_periods() {
             let name = format!("off{off}.json");
             let init = configured(desk, PROT_D * factor, &name);
             let init = text(&init.stdout) + &text(&init.stderr);
-            by_init += usize::from(init.contains("the rotation period is"));
+            by_init += usize::from(init.contains("a rotation period of"));
             let out = format!("off{off}");
             let search = dimcmc(&["periodogram", &name, "--out", &out, "--draws", "1000"], &desk.path("."));
             let printed = text(&search.stdout) + &text(&search.stderr);
-            by_search += usize::from(printed.contains("the rotation period is") || !search.status.success());
+            by_search += usize::from(printed.contains("a rotation period of") || !search.status.success());
             if search.status.success() {
                 let of = desk.json(&format!("{out}/periodogram.json"));
                 let finding = of["verdict"]["finding"].as_str().unwrap().to_owned();

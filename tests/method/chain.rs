@@ -241,7 +241,10 @@ fn a_displaced_ensemble_and_a_stuck_walker_are_not_converged() {
     assert!(summary.parameters["phi"].rhat.unwrap() < 1.01, "the other parameter is fine");
     let text = table(&summary, None);
     let last = text.lines().last().unwrap();
-    assert!(last.starts_with("Not converged: do not quote intervals. k_kms: R-hat 1.") && last.contains("--extend"), "{last}");
+    assert!(
+        last.starts_with("Not converged: do not quote intervals. k_kms: R-hat 1.") && last.contains("--extend"),
+        "{last}"
+    );
 
     // of several parameters one number of steps, that of the worst
     let slow = chain(&["a", "b", "c"], [4, 8, 400], &mut |rng, [ensemble, ..]| {

@@ -173,11 +173,13 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
     let (used, all) = (few.iter().map(count).sum::<usize>(), profiles.iter().map(count).sum::<usize>());
     let of = if used < all { format!("{used} of the {all}") } else { format!("the {all}") };
     let spots = field.map_or_else(String::new, |field| {
-        let lifetime = field.spot_lifetime_d.map_or_else(String::new, |days| format!(", lifetime ≈ {days:.0} d"));
+        let digits = |days: f64| (1.0 - days.log10().floor()).clamp(0.0, 2.0) as usize;
+        let lifetime =
+            field.spot_lifetime_d.map_or_else(String::new, |days| format!(", lifetime ≈ {days:.0$} d", digits(days)));
         format!(" (spot amplitude {:.2}{lifetime})", field.spot_amplitude)
     });
     let chi2 = maps.summary.chi2_per_datum;
-    trial.end = End::Fits(format!("evolving maps fit {of} profiles with chi2 = {chi2:.2} per datum{spots}"));
+    trial.end = End::Fits(format!("evolving maps fit {of} profiles with χ²/N = {chi2:.2}{spots}"));
     // errors of one data set are those of all its profiles; a scene of several takes a fit
     trial.errors = match profiles {
         [_] => vec![self::scene(draft, place.config, profiles)?.measured.errors],

@@ -85,7 +85,8 @@ impl Scene {
                 return Err(PlotError::Content { path: run.into(), problem });
             }
             if chain.manifest.origin.data_sha256 != header.origin.data_sha256 {
-                let problem = format!("the run is of other observations than the likelihood grid in {}", folder.display());
+                let problem =
+                    format!("the run is of other observations than the likelihood grid in {}", folder.display());
                 return Err(PlotError::Content { path: run.into(), problem });
             }
         }
@@ -116,7 +117,8 @@ impl Scene {
     /// The landscape of a single parameter.
     fn curve(&self) -> Figure {
         let mut figure = Figure::new("landscape", COLUMN_MM, 70.0);
-        figure.caption = "Likelihood grid: chi2 at the nodes (points) minus the lowest, with the paraboloid (line).".into();
+        figure.caption =
+            "Likelihood grid: chi2 at the nodes (points) minus the lowest, with the paraboloid (line).".into();
         let frame = Rect { left: 38.0, top: 8.0, width: figure.width - 46.0, height: figure.height - 36.0 };
         let points: Vec<[f64; 2]> = self.nodes[0].iter().enumerate().map(|(k, x)| [*x, self.at(&[k])]).collect();
         let highest = points.iter().map(|p| p[1]).filter(|y| y.is_finite()).fold(1.0, f64::max).min(DARKEST * DARKEST);

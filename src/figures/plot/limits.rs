@@ -1,11 +1,11 @@
 //! The detection map: which share of the orbits of each period and semi-amplitude a blind search recovers.
 
 use super::{POSITIVE, PlotError};
-use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{BLUE, ColourMap, GREY, SKY, VERMILION, WHITE};
 use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Stroke, width_pt};
+use crate::planets::speeds::Speeds;
 use crate::planets::verdict::speed;
 use crate::runs::limits::{Comparison, JSON, Limit, LimitsFile};
 use crate::runs::origin;
@@ -126,7 +126,8 @@ impl Found {
 fn found(file: &LimitsFile) -> Option<Found> {
     match &file.removed {
         Some(orbit) => {
-            Some(Found { period_d: file.before.period_d, k_kms: Some(orbit.k_kms.abs()), was_removed: true })
+            let period_d = orbit.porb_over_prot * file.rotation_period_d();
+            Some(Found { period_d, k_kms: Some(orbit.k_kms.abs()), was_removed: true })
         }
         None => (file.before.false_alarm_probability < file.false_alarm_probability).then_some(Found {
             period_d: file.before.period_d,

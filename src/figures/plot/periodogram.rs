@@ -3,7 +3,6 @@
 
 use super::symbols::{PERIOD_DIGITS, decimals};
 use super::{POSITIVE, PlotError, velocities};
-use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figures::drawing::panel::Sides;
@@ -12,6 +11,7 @@ use crate::figures::drawing::{
     width_pt,
 };
 use crate::model::Parameter;
+use crate::planets::speeds::Speeds;
 use crate::runs::blind_search::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::runs::origin;
 use std::path::Path;

@@ -103,7 +103,10 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     let beside = Panel {
         frame: nights,
         x: Axis::linear("nights", [0.0, 1.08 * most.max(1) as f64]),
-        y: Axis::log(&format!("median *K* ({})", unit.name), range_of(medians(file).map(|kms| unit.factor * kms), Scale::Log, 0.08)),
+        y: Axis::log(
+            &format!("median *K* ({})", unit.name),
+            range_of(medians(file).map(|kms| unit.factor * kms), Scale::Log, 0.08),
+        ),
     };
     for (k, schedule) in file.schedules.iter().enumerate() {
         let of = |number: fn(&AfterRecord) -> Option<f64>| -> Vec<[f64; 2]> {

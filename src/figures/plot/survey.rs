@@ -2,13 +2,13 @@
 //! of planets.
 
 use super::{POSITIVE, PlotError};
-use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{ColourMap, GREY, SERIES, SKY, VERMILION, WHITE};
 use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};
 use crate::figures::drawing::{
     Align, Axis, Colour, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Stroke, width_pt,
 };
+use crate::planets::speeds::Speeds;
 use crate::runs::origin;
 use crate::runs::survey::{COMPLETENESS, JSON, RateRecord, Size, StarRecord, SurveyFile};
 use std::path::Path;

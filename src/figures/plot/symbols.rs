@@ -1,8 +1,8 @@
 //! The symbols of astronomers for parameters.
 
-use crate::planets::speeds::Speeds;
 use crate::figures::drawing::Axis;
 use crate::model::Parameter;
+use crate::planets::speeds::Speeds;
 
 /// Decimals of a period in days, in figures and tables alike.
 pub const PERIOD_DIGITS: usize = 4;

@@ -2,16 +2,16 @@
 //! folded with the orbit.
 
 use super::ephemeris::ephemeris;
-use super::symbols::{decimals};
+use super::symbols::decimals;
 use super::times::{Clock, Stretch, stretches};
 use super::{ANY, PlotError};
-use crate::planets::speeds::Speeds;
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};
 use crate::data::io::provenance::Provenance;
 use crate::figures::drawing::colour::{BLACK, BLUE, GREY, PURPLE, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
+use crate::planets::speeds::Speeds;
 use crate::planets::verdict::speed;
 use crate::runs::blind_search::{KnownPlanetRecord, OrbitRecord, PeriodogramFile};
 use crate::runs::origin;

@@ -2,13 +2,13 @@
 
 use super::chapter::{Chapter, NOTHING, Tone, number, pairs, parameters, table, tone};
 use super::{injection, maps, planned, run, verdicts};
-use crate::planets::speeds::Speeds;
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, Shown, decimals, label, symbol};
 use crate::model::{Estimate, OrbitQuantity, Parameter, Quoted, definition, quoted_definition};
+use crate::planets::speeds::Speeds;
 use crate::planets::verdict::{extrapolated, probability};
 use crate::runs::blind_search::{self, PeakRecord, PeriodogramFile};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
@@ -152,7 +152,10 @@ fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
                 label(&axis.name)
             ),
         ),
-        _ => (Tone::Good, "The highest node lies within the likelihood grid, and a paraboloid fits around it.".to_owned()),
+        _ => (
+            Tone::Good,
+            "The highest node lies within the likelihood grid, and a paraboloid fits around it.".to_owned(),
+        ),
     };
     let fit = found.map(|found| {
         pairs(&[

@@ -1,8 +1,8 @@
 //! Injected orbits, and detection limits by injection and recovery.
 
+use super::chapter::Tone;
 use super::chapter::{Chapter, Table, number, pairs};
 use crate::data::io::truth::InjectedTruth;
-use super::chapter::Tone;
 use crate::planets::speeds::Speeds;
 use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;

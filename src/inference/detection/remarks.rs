@@ -7,7 +7,7 @@ use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::nights::NightOffsets;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::posterior_shares;
-use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
+use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals, speed};
 use crate::surface::imaging::Imager;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
@@ -58,9 +58,7 @@ impl Detection {
     pub fn co_rotation(&self) -> String {
         match self.co_rotation_penalty {
             Some(ratio) if ratio > 1.1 => {
-                format!(
-                    "Sensitivity is lowest at P = P_rot (spot modulation): σ_K is {ratio:.1} times its median there."
-                )
+                format!("At P = P_rot σ_K is {ratio:.1} times its median (spot modulation).")
             }
             Some(ratio) => format!("At P = P_rot σ_K is {ratio:.2} times its median."),
             None => "At P = P_rot an orbit is degenerate with spot modulation, and K is unbounded there.".to_owned(),
@@ -279,8 +277,30 @@ fn of_choices(robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<R
             ),
         ));
     }
-    remarks.extend(decided(&robustness.decisive_nights(level)));
+    let [moving, losing] = robustness.decisive_nights(level);
+    remarks.extend(match losing.len() > NIGHTS_NAMED && moving.is_empty() {
+        true => marginal(robustness, &losing, level),
+        false => decided(&[moving, losing].concat()),
+    });
     remarks
+}
+
+/// That a signal is not significant without whichever of many nights, though its K stays.
+fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Option<Remark> {
+    let orbits = || robustness.nights.iter().filter_map(|night| night.orbit);
+    let lowest = nights.iter().filter_map(|night| night.orbit).map(|orbit| orbit.delta_ln_l).reduce(f64::min)?;
+    let [low, high] = [f64::min, f64::max].map(|which| orbits().map(|orbit| orbit.k_kms).reduce(which));
+    let (low, high) = low.zip(high)?;
+    Some(Remark::against(
+        "FAP > 1 % without single nights",
+        format!(
+            "Without any one of {} nights Δln L falls below the 1 % threshold, {level:.1} (lowest: {lowest:.1}); K stays \
+            {} to {}: more nights are needed.",
+            nights.len(),
+            speed(low, 0.1 * high),
+            speed(high, 0.1 * high)
+        ),
+    ))
 }
 
 /// That a signal is not significant beside such offsets.

@@ -219,20 +219,22 @@ impl Robustness {
         (largest > MOVES).then_some(largest)
     }
 
-    /// Nights that make the result: without them ln L of the orbit falls below `level`, where it was above, or K moves
-    /// by more than the profiles left out explain.
-    pub fn decisive_nights(&self, level: f64) -> Vec<&WithoutNight> {
-        let Some(all) = self.all else { return Vec::new() };
-        let decides = |night: &&WithoutNight| {
+    /// Nights that make the result: without which K moves by more than the profiles left out explain, and others without
+    /// which ln L of the orbit falls below `level`, where it was above.
+    pub fn decisive_nights(&self, level: f64) -> [Vec<&WithoutNight>; 2] {
+        let Some(all) = self.all else { return [Vec::new(), Vec::new()] };
+        let moves = |night: &&WithoutNight| {
             night.orbit.is_none_or(|orbit| {
                 // of nested data, the variance of the difference is that of the variances
                 let by_chance = (orbit.sigma_k_kms.powi(2) - all.sigma_k_kms.powi(2)).max(0.0).sqrt();
-                let moved = (orbit.k_kms - all.k_kms).abs();
-                let lost = all.delta_ln_l > level && orbit.delta_ln_l <= level;
-                lost || moved > SURPRISE * by_chance.max(0.3 * all.sigma_k_kms)
+                (orbit.k_kms - all.k_kms).abs() > SURPRISE * by_chance.max(0.3 * all.sigma_k_kms)
             })
         };
-        self.nights.iter().filter(decides).collect()
+        let loses = |night: &&WithoutNight| {
+            night.orbit.is_some_and(|orbit| all.delta_ln_l > level && orbit.delta_ln_l <= level)
+        };
+        let (moving, rest): (Vec<_>, Vec<_>) = self.nights.iter().partition(moves);
+        [moving, rest.into_iter().filter(loses).collect()]
     }
 }
 

@@ -29,7 +29,8 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
     }
     verdict = verdict.with_periods(found.shares(&|ratio| periods.contain(ratio)));
     let prior = scene.settings.free.iter().find(|f| f.parameter == Parameter::K).map(|f| f.prior);
-    if let Some((Signal { k_kms, sigma_k_kms, .. }, prior)) = verdict.signal.zip(prior).filter(|(s, prior)| !prior.contains(s.k_kms))
+    if let Some((Signal { k_kms, sigma_k_kms, .. }, prior)) =
+        verdict.signal.zip(prior).filter(|(s, prior)| !prior.contains(s.k_kms))
     {
         let (low, high) = prior.bounds();
         let outside = Remark::against(

@@ -222,7 +222,7 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
     let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
     let offsets = match alarm.night_offsets_kms {
-        kms if kms > 0.0 => format!(", RV offsets of nights {:.0} m/s", 1000.0 * kms),
+        kms if kms > 0.0 => format!(" with RV offsets of nights of {:.0} m/s", 1000.0 * kms),
         _ => String::new(),
     };
     format!(

@@ -174,6 +174,11 @@ impl LimitsFile {
         })
     }
 
+    /// The rotation period that periods are in units of (d).
+    pub fn rotation_period_d(&self) -> f64 {
+        self.limits.first().map_or(f64::NAN, |limit| limit.period_d / limit.porb_over_prot)
+    }
+
     /// Medians over the periods of what would have been found.
     pub fn sentence(&self) -> String {
         let unit = Speeds::of(&self.k_kms);
@@ -214,10 +219,11 @@ impl LimitsFile {
             self.phases
         );
         if let Some(orbit) = self.removed {
-            let BeforeRecord { period_d, false_alarm_probability, draws, .. } = self.before;
+            let BeforeRecord { false_alarm_probability, draws, .. } = self.before;
+            let period_d = orbit.porb_over_prot * self.rotation_period_d();
             let digits = decimals(0.01 * period_d);
             text += &format!(
-                "subtracted first: signal of P = {period_d:.digits$} d, K = {} ({})\n",
+                "Subtracted: P = {period_d:.digits$} d, K = {} ({})\n",
                 speed(-orbit.k_kms, 0.1 * orbit.k_kms.abs()),
                 false_alarm(false_alarm_probability, draws)
             );

@@ -236,11 +236,11 @@ impl MeasuredStar {
     pub fn line(&self) -> String {
         let MeasuredStar { numbers, mean_profile, gain, .. } = self;
         if numbers.is_empty() {
-            let why = if *gain < NEEDED { "" } else { ", less than values so far from their priors cost" };
-            return format!(
-                "none: star as in the config, active regions with the photosphere's line (fitting them gains Δln Z = \
-                {gain:.1}{why})"
-            );
+            let why = match *gain < NEEDED {
+                true => format!("Δln Z = {gain:.1}, {NEEDED} needed"),
+                false => format!("Δln Z = {gain:.1}, but the fitted values are too far from their priors"),
+            };
+            return format!("values of the config kept, active regions with the photosphere's line ({why})");
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
             let name = name.trim_end_matches("_kms").replace('_', " ");

@@ -113,8 +113,8 @@ impl OtherRotation {
         let OtherRotation { rotation_period_d, given_period_d, ln_evidence_gain, spot_lifetime_d: [there, here] } =
             self;
         format!(
-            "the rotation period is {rotation_period_d:.3} d rather than {given_period_d:.3} d (Δln Z = \
-            {ln_evidence_gain:.0}, spot lifetime {there:.1} instead of {here:.2} d): set star.rotation_period_d"
+            "a rotation period of {rotation_period_d:.3} d fits better than {given_period_d:.3} d (Δln Z = \
+            {ln_evidence_gain:.0}; spot lifetime {there:.1} d, not {here:.2} d): correct star.rotation_period_d"
         )
     }
 }

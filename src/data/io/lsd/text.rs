@@ -55,7 +55,11 @@ impl RawProfile {
             }
         };
         if let Some((_, bad)) = self.bad.iter().find(|(bin, _)| middle.contains(bin)) {
-            let problem = format!("{}: a bad bin may only lie outside of the velocity range in use", bad.problem);
+            let problem = format!(
+                "{}, within the velocity range in use: interpolate the bin, leave the profile out, or narrow \
+                 observations.velocity_range_kms",
+                bad.problem
+            );
             return fault(bad.line, problem);
         }
         let start = self.bad.iter().map(|(bin, _)| bin + 1).filter(|bin| *bin <= middle.start).max().unwrap_or(0);

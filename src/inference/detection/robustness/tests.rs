@@ -37,8 +37,10 @@ fn what_hangs_on_a_choice_is_named() {
     let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets, nights };
     assert_eq!(steady.held_out(), Some(HeldOut { delta_ln_p: 4.0, sigma_delta_ln_p: 0.0, nights: 4 }));
     assert_eq!(steady.target_matters(), None);
-    let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();
-    assert_eq!(decisive, vec![orbit(0.2, 0.03, 7.0), orbit(0.27, 0.0225, 15.0), None]);
+    let orbits = |nights: &Vec<&WithoutNight>| nights.iter().map(|n| n.orbit).collect::<Vec<_>>();
+    let [moving, losing] = steady.decisive_nights(8.0);
+    assert_eq!(orbits(&moving), vec![orbit(0.27, 0.0225, 15.0), None]);
+    assert_eq!(orbits(&losing), vec![orbit(0.2, 0.03, 7.0)]);
     let shaky = Robustness { targets: vec![at(0.18), at(0.2), at(0.2)], ..steady };
     assert!((shaky.target_matters().unwrap() - 1.0).abs() < 1e-12);
 }

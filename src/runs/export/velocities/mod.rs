@@ -220,6 +220,6 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
             velocities.times_d.len()
         );
     }
-    text += "\nA fitted jitter does not correct this: it is independent from night to night, too.\n";
+    text += "\nA fitted jitter does not correct this: it is independent from profile to profile.\n";
     text
 }

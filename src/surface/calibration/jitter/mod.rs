@@ -108,9 +108,7 @@ pub enum JitterError {
     #[error(transparent)]
     Reference(#[from] ReferenceError),
     /// Velocities without bounds, or none at all.
-    #[error(
-        "\"fitted\" needs three profiles with constrained RVs: give a number (0: stable spectrograph)"
-    )]
+    #[error("\"fitted\" needs three profiles with constrained RVs: give a number (0: stable spectrograph)")]
     Unbounded,
 }
 
