@@ -31,8 +31,8 @@ pub fn bare(text: &str) -> String {
     text.chars().filter(|c| c.is_alphanumeric() || *c == '/').flat_map(char::to_lowercase).collect()
 }
 
-/// Possible readings of a line as the names of this many columns, the plain ones first: words by any separator, words
-/// in brackets being units of the one before, or words separated by two blanks.
+/// Possible readings of a text line as the names of this many columns, the plain ones first: words by any separator,
+/// words with units in brackets after them, or words separated by two blanks.
 pub fn readings(line: &str, columns: usize) -> Vec<Vec<Name>> {
     all_readings(line, columns..=columns)
 }
