@@ -67,12 +67,12 @@ thread_local! {
     static SPARE_PIXELS: Cell<Vec<Pixels>> = const { Cell::new(Vec::new()) };
 }
 
-/// Memory for blocks, uninitialised.
+/// Memory for blocks, with arbitrary content.
 pub fn spare_blocks() -> Vec<Block> {
     SPARE_BLOCKS.take()
 }
 
-/// Memory for pixels, uninitialised.
+/// Memory for pixels, with arbitrary content.
 pub fn spare_pixels() -> Vec<Pixels> {
     SPARE_PIXELS.take()
 }

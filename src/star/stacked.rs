@@ -94,8 +94,8 @@ impl Response {
         })
     }
 
-    /// Line depth of every bin and continuum of every profile for the brightness map `x`; or for the maps in `x`, in
-    /// sequence, one for each profile's index.
+    /// Line depth of every bin and continuum of every profile for the brightness map `x`; or for several maps in `x` in
+    /// sequence, each profile using its own.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         for (part, profiles, bins) in self.places() {
