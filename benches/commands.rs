@@ -1,6 +1,6 @@
 //! Whole commands, as users run them: seconds, processor seconds, peak memory, reconstructions.
 //!
-//! Memory and processor time are read from `/proc` (Linux) while the command runs; elsewhere they are not known.
+//! Memory and processor time are read from `/proc` (Linux) while the command runs; elsewhere they are unknown.
 
 mod common;
 
@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 struct Case {
     command: &'static str,
     config: &'static str,
-    /// The word after the number of reconstructions in what it prints.
+    /// The word after the number of reconstructions in its output.
     counted: &'static str,
-    /// What it prints if all went well.
+    /// Its output on success.
     good: &'static str,
 }
 
@@ -63,7 +63,7 @@ fn main() {
     table.print("All processors. Reconstructions of a chain are those of its steps, without the search before them.");
 }
 
-/// A command that has run.
+/// A finished command.
 struct Run {
     seconds: f64,
     usage: Usage,
@@ -103,7 +103,7 @@ fn drain(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     })
 }
 
-/// What a process used.
+/// Resources used by a process.
 #[derive(Default)]
 struct Usage {
     processor_s: Option<f64>,
@@ -111,7 +111,7 @@ struct Usage {
 }
 
 impl Usage {
-    /// Looks every few milliseconds until the process is a zombie, whose processor time is final but whose memory is
+    /// Polls every few milliseconds until the command is a zombie, whose processor time is final but whose memory is
     /// gone.
     fn until_the_end_of(child: &mut Child) -> Self {
         let mut usage = Usage::default();
@@ -131,7 +131,7 @@ impl Usage {
     }
 }
 
-/// Most memory that a process has had resident.
+/// Peak resident memory of a process.
 fn peak_kib(status: &str) -> Option<f64> {
     status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB")?.trim().parse().ok())
 }

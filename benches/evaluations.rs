@@ -1,5 +1,5 @@
-//! Evaluations of the log-probability over the bulk of the paper's posterior: how many a second, passes each, what they
-//! cost beyond their passes, and how far they are from solutions to rounding error.
+//! Evaluations of the log-probability over the bulk of the paper's posterior: their rate, passes per evaluation, cost
+//! beyond passes, and deviation from solutions to rounding error.
 
 mod common;
 
@@ -16,7 +16,7 @@ const OVER_PASSES: Target = Target::AtMost(1.5);
 /// Error of the log-probability, in units of 1e-3.
 const ERROR: Target = Target::AtMost(1.0);
 
-/// Times that everything is timed; the fastest counts.
+/// Number of repetitions; the fastest counts.
 const ROUNDS: usize = 5;
 
 /// Model applications per evaluation: median and 95 %.
@@ -77,8 +77,7 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
         let [mut time, mut double, mut own] = [f64::INFINITY; 3];
         for _ in 0..ROUNDS {
             time = time.min(seconds(|| bulk.target.evaluate(theta)));
-            // a response in the memory that the evaluation had its own in: with two of them one would be in the other's
-            // way
+            // a response in the memory used by the evaluation: two of them would evict each other from the cache
             let problem = Posterior::behind(&**bulk.target.posterior()).expect("a static map").reconstruct(theta).1;
             let (response, single) = (problem.response(), problem.single_applications());
             let mut only_passes = Passes::new(response);

@@ -1,5 +1,5 @@
-//! The field integrated out of line profiles: what a new design costs, what a new orbit with the design unchanged, and
-//! what is asked for more rarely.
+//! Line profiles marginalised over the field: the cost of a new design, of a new orbit with the design unchanged, and
+//! of less frequent operations.
 
 mod common;
 
@@ -13,10 +13,10 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 const NEW_DESIGN: Target = Target::AtMost(200.0);
 const NEW_ORBIT: Target = Target::AtMost(2.0);
 
-/// Times that everything is timed; the fastest counts.
+/// Number of repetitions; the fastest counts.
 const ROUNDS: usize = 5;
 
-/// Numbers of a profile, and how far (km/s) they reach to both sides.
+/// Data per profile, and their half range (km/s).
 const NUMBERS: usize = 28;
 const REACH_KMS: f64 = 50.0;
 
@@ -73,7 +73,7 @@ fn measure(profiles: usize, table: &mut Table) {
     ]);
 }
 
-/// Profiles of a star that rotates in 3.1 d, one a night.
+/// Profiles of a star that rotates in 3.1 d, one per night.
 fn epochs(harmonics: &Harmonics, profiles: usize) -> Vec<Epoch> {
     let (longitudes, latitudes): (Vec<f64>, Vec<f64>) = (0..RINGS)
         .flat_map(|ring| {

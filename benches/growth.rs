@@ -1,4 +1,4 @@
-//! How a pass and an evaluation grow with pixels, profiles and velocity bins.
+//! Cost of a pass and of an evaluation as a function of pixels, profiles and velocity bins.
 
 mod common;
 
@@ -18,7 +18,7 @@ use rand_distr::StandardNormal;
 /// Exponent of the cost as a power of the size.
 const EXPONENT: Target = Target::AtMost(1.1);
 
-/// Pixels where they are not what grows.
+/// Pixels where another size is varied.
 const PIXELS: usize = 2000;
 
 /// Passes timed together.
@@ -27,8 +27,8 @@ const PASSES: u32 = 10;
 /// Parameter vectors evaluated at each size.
 const POINTS: usize = 24;
 
-/// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size,
-/// down to impossible ones: noise moves chi2 by the square root of twice the number of data.
+/// Target chi2 below that of the true map. A fixed chi2 per datum would require a different fit at every size, down to
+/// impossible ones: noise moves chi2 by the square root of twice the number of data.
 const FIT: f64 = 100.0;
 
 /// Standard deviations of K, period and phase in the paper's setup.
@@ -70,7 +70,7 @@ impl Case {
         let scene = scene(Free::Three, size);
         let data = scene.imager.data.depth.len() as f64;
         let target = (chi2_of_truth(&scene) - FIT) / data;
-        // the trade-off curve that it does without costs no evaluation anything
+        // the omitted trade-off curve does not affect the cost of evaluations
         let reference = Reference::provisional(&scene.imager, scene.settings.values, target).unwrap();
         let response = reference.response.clone();
         let start = scene.space.start();

@@ -1,4 +1,4 @@
-//! All maps integrated over: what ln Z costs with a new star, a new field and a new orbit, from one reference; on one
+//! Marginal likelihood: the cost of ln Z with a new star, a new field and a new orbit, from one reference; on one
 //! thread.
 
 mod common;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 const NEW_STAR: Target = Target::AtMost(200.0);
 const NEW_ORBIT: Target = Target::AtMost(2.0);
 
-/// Times that everything is timed; the fastest counts.
+/// Number of repetitions; the fastest counts.
 const ROUNDS: usize = 7;
 
 /// Standard errors of K (km/s), Porb/Prot, phi, inclination (deg) and vsini (km/s) of such a star.
@@ -46,7 +46,7 @@ fn main() {
     );
 }
 
-/// A star of so many profiles.
+/// A star with this many profiles.
 fn scene(profiles: usize) -> Scene {
     let cycle = |k: usize| 5.0 * (k as f64 + 0.3 * (7.0 * k as f64).sin()) / profiles as f64;
     let cycles: Vec<f64> = (0..profiles).map(cycle).collect();
@@ -79,7 +79,7 @@ fn measure(profiles: usize, table: &mut Table) {
         let held = Held { break_degree: Known::default().break_degree(), jitter_kms: 0.0 };
         MarginalPosterior::new(scene.imager.clone(), &space, values, held).expect("a reference")
     };
-    // so far away, another place each time
+    // at this distance, another point each time
     let ms = |posterior: &MarginalPosterior, far: &dyn Fn(usize, f64) -> f64| {
         let here = posterior.space().theta_of(&posterior.reference().values);
         let round = |k: usize| {

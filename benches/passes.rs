@@ -1,4 +1,4 @@
-//! The response: forward, transpose and build, against the obvious loop and against a straight read of as many bytes.
+//! The response: forward, transpose and build, against a plain loop and against a sequential read of as many bytes.
 
 mod common;
 #[path = "../tests/common/plain_loop.rs"]
@@ -18,12 +18,12 @@ const WINDOW: usize = 16;
 /// Times fewer nanoseconds than the plain loop.
 const OVER_PLAIN: Target = Target::AtLeast(4.0);
 
-/// Times a straight read.
+/// Multiple of a sequential read.
 const OVER_READ: Target = Target::AtMost(3.0);
 
 const ROUNDS: usize = 50;
 
-/// Of what is compared with nothing.
+/// Label of rows without a comparison.
 const OTHER_ROUNDS: usize = 25;
 
 /// Runs in a row; an evaluation makes 20 passes and more.
@@ -60,7 +60,7 @@ fn main() {
     ));
 }
 
-/// A straight read with the instructions that the response has.
+/// A sequential read with the instructions of the response.
 struct Read<'a>(&'a [u64]);
 
 impl Task for Read<'_> {
@@ -115,7 +115,8 @@ fn passes(scene: &Scene, pixels: usize, table: &mut Table) {
     }
 }
 
-/// Responses for new stellar parameters and for a new orbit, and a pass of those there and back in single precision.
+/// Responses for new stellar parameters and for a new orbit, and a pass of those, forward and back, in single
+/// precision.
 fn others(scene: &Scene, pixels: usize, table: &mut Table) {
     let (imager, state) = (&scene.imager, truth(scene));
     let response = imager.response(&state);

@@ -1,8 +1,8 @@
-//! Ranks of a cluster against one thread: what the queue between them costs, how two workers share a batch, and the
-//! numbers that `examples/scaling.py` makes a cluster of: seconds of evaluations, of messages, and of the work that
+//! Ranks of a cluster against one thread: the cost of the queue between them, the sharing of a batch by two workers,
+//! and the inputs of `examples/scaling.py` for a cluster: seconds of evaluations, of messages, and of the work that
 //! only rank 0 does.
 //!
-//! Starts itself anew by `mpirun`.
+//! Starts itself by `mpirun`.
 
 mod common;
 
@@ -23,25 +23,25 @@ use std::convert::Infallible;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
-/// Seconds through the seam with one rank over those without it.
+/// Seconds with the queue and one rank over those without it.
 const OVERHEAD: Target = Target::AtMost(1.02);
 
-/// Times as many evaluations a second, over the number of workers.
+/// Gain in evaluations per second, over the number of workers.
 const EFFICIENCY: Target = Target::AtLeast(0.9);
 
-/// Parameter vectors of a batch: what the halves of four ensembles of 32 walkers ask for at once.
+/// Parameter vectors of a batch: one request by the halves of four ensembles of 32 walkers.
 const BATCH: usize = 64;
 
-/// Of these, as many as are evaluated one by one.
+/// Number of these that are evaluated one by one.
 const SINGLE: usize = 16;
 
-/// Rounds; of a shared machine the fastest counts, so that many short ones say more than a few long ones.
+/// Rounds; on a shared machine the fastest counts, so that many short ones are better than a few long ones.
 const ROUNDS: usize = 25;
 
 /// Rounds of whole batches.
 const BATCHES: usize = 12;
 
-/// Questions that nobody has to think about.
+/// Requests without computation.
 const ECHOES: usize = 2000;
 
 const CASES: [(Free, usize); 2] = [(Free::Three, 2000), (Free::Seven, 2000)];
@@ -129,7 +129,7 @@ struct Case {
 
 impl Case {
     fn new(free: Free, pixels: usize) -> Self {
-        // of the config as it is written, which is what ranks know: not with the start moved to the truth
+        // of the config as in its file, which ranks read: not with the start moved to the truth
         let Settings { resolved, path, .. } = scene(free, Size::pixels(pixels)).settings;
         let scene = Scene::new(&Config::at(resolved.clone(), &path)).unwrap();
         let settings = search::SearchSettings { other_starts: 0, ..scene.search_settings() };
@@ -193,7 +193,7 @@ fn workers(queue: &Queue) {
     ));
 }
 
-/// What a simulated cluster is made of.
+/// The parameters of a simulated cluster.
 fn ingredients(queue: &Queue) {
     let columns =
         ["free", "pixels", "ms of an evaluation: 5 %", "50 %", "95 %", "largest / mean", "ms of rank 0 for a proposal"];
@@ -226,7 +226,7 @@ fn ingredients(queue: &Queue) {
     );
 }
 
-/// Answers at once.
+/// Answers immediately.
 struct Instantly;
 
 impl Evaluator for Instantly {

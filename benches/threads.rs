@@ -7,10 +7,10 @@ use common::stopwatch::{Candidate, fastest, in_turn};
 use common::table::{Table, Target, thousands};
 use dimcmc::internals::sampling::log_density::{Evaluator, Threads};
 
-/// Times as many evaluations a second.
+/// Gain in evaluations per second.
 const TWICE: Target = Target::AtLeast(1.8);
 
-/// Parameter vectors of a batch: what the halves of four ensembles of 32 walkers ask for at once.
+/// Parameter vectors of a batch: one request by the halves of four ensembles of 32 walkers.
 const BATCH: usize = 64;
 
 const ROUNDS: usize = 15;

@@ -2,9 +2,9 @@
 //!
 //!     cargo run --release --example blind_search -- periodogram star/config.json --out star/found
 //!
-//! Nights are left out one by one only where a planet is found by the marginal likelihood, other targets are not tried,
-//! and objectives for which stars do not change are not asked whether they do (verdicts are those of version 0.1.0).
-//! No number of the search changes by that. `calibration_changing.py` runs it.
+//! Nights are left out one by one only where the marginal likelihood detects a planet, other targets are not tested,
+//! and static objectives are not tested for spot evolution (verdicts are those of version 0.1.0). This changes no
+//! number of the search. `calibration_changing.py` runs it.
 
 use dimcmc::{BlindSearch, BlindSearchOptions, RobustnessOf, Scene};
 use std::path::Path;

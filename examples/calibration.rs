@@ -3,7 +3,7 @@
 //!
 //!     cargo run --release --example calibration -- 300 results/calibration
 //!
-//! writes null.csv and planet.csv (a line a star) and prints the tables of `results/calibration.md`.
+//! writes null.csv and planet.csv (one line per star) and prints the tables of `results/calibration.md`.
 
 use dimcmc::internals::data::config;
 use dimcmc::internals::data::io::csv::Table;
@@ -29,7 +29,7 @@ const K_KMS: f64 = 0.06;
 /// Draws of each star's posterior.
 const DRAWS: usize = 2000;
 
-/// Periods within this share of the rotation period are near co-rotation.
+/// Periods within this fraction of the rotation period are near co-rotation.
 const NEAR: f64 = 0.15;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -53,7 +53,7 @@ fn in_parallel<T: Send>(stars: usize, star: impl Fn(u64) -> Result<T, Failure> +
     (0..stars).into_par_iter().with_max_len(1).map(|seed| star(seed as u64)).collect()
 }
 
-/// A star like the demo's with spots and noise of its own.
+/// A star like the demo's with its own spots and noise.
 fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) -> (Imager, ParameterValues) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut spot = || Spot {
@@ -89,7 +89,7 @@ fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Fai
     Ok(Detection::find(imager, scene.settings.values, frequencies(imager)?, &settings, &|_| ())?)
 }
 
-/// What a star without a planet showed.
+/// Results for a star without a planet.
 struct NullStar {
     chi2_per_datum: f64,
     unresolved_spots: f64,
@@ -99,7 +99,7 @@ struct NullStar {
     false_alarm: [f64; 2],
 }
 
-/// What is known of the spots that the map leaves over.
+/// Models of the residual (unresolved-spot) noise.
 const MODELS: [&str; 2] = ["as the entropy has it", "fitted"];
 
 fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Failure> {
@@ -146,7 +146,7 @@ impl NullStar {
     }
 }
 
-/// What a star with a planet showed.
+/// Results for a star with a planet.
 struct PlanetStar {
     porb_over_prot: f64,
     /// Highest peak of the blind search, and its false-alarm probability.
@@ -155,7 +155,7 @@ struct PlanetStar {
     false_alarm: f64,
     k_kms: f64,
     sigma_k_kms: f64,
-    /// For each of [`MODELS`], the share of the posterior below the truth in K, Porb/Prot, phi (within half a turn).
+    /// For each of [`MODELS`], the fraction of the posterior below the truth in K, Porb/Prot, phi (within half a turn).
     ranks: [[f64; 3]; 2],
 }
 
@@ -199,7 +199,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
     })
 }
 
-/// Share of the draws below the truth; of phases, around their mean direction.
+/// Fraction of the draws below the truth; for phases, around their mean direction.
 fn ranks(draws: &[Vec<f64>], truth: [f64; 3]) -> [f64; 3] {
     let share =
         |below: &dyn Fn(&Vec<f64>) -> bool| draws.iter().filter(|d| below(d)).count() as f64 / draws.len() as f64;
@@ -253,7 +253,7 @@ impl PlanetStar {
     }
 }
 
-/// A share in per cent with its binomial error.
+/// A fraction in per cent with its binomial error.
 fn share(count: usize, of: usize) -> String {
     let n = of.max(1) as f64;
     let p = count as f64 / n;

@@ -1,13 +1,13 @@
-"""Calibration of the marginal likelihood on simulated stars whose spots come and go, beside a static objective.
+"""Calibration of the marginal likelihood on simulated stars with evolving spots, compared with a static objective.
 
     python3 examples/calibration_changing.py --simulator target/release/dimcmc \
         --search target/release/examples/blind_search
     python3 examples/calibration_changing.py --table
 
-The first makes stars one after the other, kinds in turn, without and with a planet, searches each, and appends a line a
-star to results/calibration/changing.csv; it can be stopped at any time, and goes on where it was. `--search` is
+The first makes stars one by one, kinds in turn, without and with a planet, searches each, and appends one line per star
+to results/calibration/changing.csv; it can be stopped at any time, and resumes where it was. `--search` is
 `dimcmc`, or the example `blind_search`, which takes half the time. The second writes results/calibration-changing.md.
-Needs numpy, and what the simulator needs.
+Needs numpy, and the requirements of the simulator.
 """
 
 import argparse
@@ -37,9 +37,9 @@ KINDS = {
     "shear": {"lifetime": 30},
 }
 K_KMS, PERIODS = (0.03, 0.3), (0.5, 4.0)
-# of the kind "geometry": inclination (deg), vsini (km/s), rotation period (d), lifetime (d)
+# kind "geometry": inclination (deg), vsini (km/s), rotation period (d), lifetime (d)
 INCLINATION_DEG, VSINI_KMS, ROTATION_D, LIFETIMES_D = (20, 75), (15, 70), (1.5, 6.0), (math.inf, 60, 30, 15, 7)
-# of the kind "shear": differential rotation (rad/d)
+# kind "shear": differential rotation (rad/d)
 SHEAR_RAD_D = (0.02, 0.1)
 # bins of 1.8 km/s as far from the edge of the line as with 57 bins at 40 km/s
 STEP_KMS, MARGIN_KMS = 1.8, 11.3
@@ -64,7 +64,7 @@ def log_uniform(random, low, high):
 
 
 def star(kind, number, planet):
-    """What a star is: its line of the table as far as it is known before the search, and the simulator's options."""
+    """A star: its line of the table before the search, and the simulator's options."""
     seed = 1_000_000 + 10_000 * list(KINDS).index(kind) + 2 * number + planet
     random = np.random.default_rng(seed)
     k, period, phi = log_uniform(random, *K_KMS), log_uniform(random, *PERIODS), float(random.random())
@@ -176,8 +176,8 @@ def at_period(folder, period_d, phi):
 
 
 def by_period(folder, row):
-    """What is left over in the velocities without the true orbit, in squares of its errors: of all together, and the
-    part of an orbit of each period, in the mean over ranges of periods (1 is expected of each)."""
+    """Residuals of the velocities from the true orbit, in squares of their errors: the total, and the part of an orbit
+    at each period, averaged over ranges of periods (the expectation of each is 1)."""
     rv = np.genfromtxt(folder / "rv.csv", delimiter=",", names=True)
     weight = np.linalg.inv(np.loadtxt(folder / "covariance.csv", delimiter=","))
     scan = np.genfromtxt(folder / "periodogram.csv", delimiter=",", names=True)
@@ -195,7 +195,7 @@ def by_period(folder, row):
 
 
 def searched(row, folder, args, static):
-    """The line of a simulated star, taken for one that does not change as well if `static`."""
+    """The line of a simulated star, also searched with a static map if `static`."""
     config = folder / "config.json"
     found, row["seconds"] = search(args.search, config, "marginal-likelihood", folder / "changing")
     best, field = found["best"], found["field"]
@@ -241,7 +241,7 @@ def one(kind, number, planet, simulator, args):
 
 
 def run(args):
-    """Stars until there are enough, those that are in the table left out."""
+    """Runs stars until there are enough, except those in the table."""
     args.work.mkdir(parents=True, exist_ok=True)
     done = {(row["kind"], row["seed"]) for row in calibration_table.resumed(args.csv)}
     for number, planet, kind in itertools.product(range(args.first, args.stars), (0, 1), args.kind or KINDS):

@@ -1,16 +1,16 @@
-"""Stars by physics that the model does not have: are false-alarm probabilities uniform, are planets found?
+"""Stars with physics that the model lacks: are false-alarm probabilities uniform, are planets detected?
 
     python3 examples/calibration_physics.py --program target/release/dimcmc --simulator stars.py
     python3 examples/calibration_physics.py --table
 
-The simulator is a program of its own, without a planet model or a kernel in common with `dimcmc`: `stars.py FOLDER
+The simulator is an independent program, without a planet model or a kernel in common with `dimcmc`: `stars.py FOLDER
 --seed N --effect NAME --k KMS` writes profiles, `observations.txt` and `truth.json`. Each star goes through
 `dimcmc init`, which is told rotation period and inclination as an observer would know them, and `dimcmc periodogram`;
 nothing else is set. Stars of no effect are searched twice more: with the jitter known to be 0, and with a local line
 that is 40 % too wide and a vsini 1 km/s too large; stars with flares once more without them, by a copy of the simulator
 that draws the flares and leaves them out, so that spots and noise are the same. One line per star goes to
 results/calibration/physics.csv; the script can be stopped, and goes on. The first three seeds are the same stars
-whatever the effect; from the fourth on each effect has other stars, but for flares, which have those of none. The
+whatever the effect; from the fourth on each effect has other stars, except flares, which have those of none. The
 second command writes results/real-stars.md. Needs numpy.
 """
 
@@ -50,7 +50,7 @@ COLUMNS = (
 
 
 def simulated(effect, number):
-    """The simulator's seed of a star: the same stars say what an effect changes, others how often it misleads."""
+    """The simulator's seed of a star: identical stars show the effect itself, others its rate of errors."""
     if number <= SHARED or effect in COMPARED:
         return number
     return number + 1000 * EFFECTS.index(effect)
@@ -73,7 +73,7 @@ def settings_of(effect):
 
 
 def without_flares(args):
-    """A copy of the simulator whose flares are drawn and not put into profiles: noise and spots are those with them."""
+    """A copy of the simulator that draws flares without adding them to profiles: noise and spots are the same."""
     text = Path(args.simulator).read_text()
     if FLARE not in text:
         sys.exit(f"{args.simulator}: no flares are found in it to leave out: {FLARE}")
@@ -214,7 +214,7 @@ def planets_found(planets, without):
 
 
 def settings(rows):
-    """Stars of no effect, searched otherwise."""
+    """Stars without an effect, searched with other settings."""
     plain = [row for row in rows if row["effect"] == "none"]
     default = [row for row in plain if row["setting"] == "default"]
     lines = []

@@ -4,11 +4,11 @@
     python3 examples/calibration_seasons.py --table
 
 Stars whose spots live 25 d are observed for 12 nights, and eleven months later for 12 more with another spectrograph,
-whose velocities are 0.3 km/s higher. In turn they have a planet of eccentricity 0.3 of which nothing is known, and one
-on a circle that transits, whose period and time are known. `dimcmc simulate` writes the profiles of both sets;
-`dimcmc sample` reads them, from a start that is not the truth, with orbit, systemic velocity, zero point and the field
-of spots free. A line a star goes to results/calibration/seasons.csv; the script can be stopped, and goes on. The
-second command writes results/calibration-seasons.md. Needs numpy.
+whose velocities are 0.3 km/s higher. In turn they have an unknown planet of eccentricity 0.3, and a transiting one on a
+circular orbit, whose period and time are known. `dimcmc simulate` writes the profiles of both sets; `dimcmc sample`
+reads them, from a start that is not the truth, with orbit, systemic velocity, RV offset and the field of spots free.
+One line per star goes to results/calibration/seasons.csv; the script can be stopped and resumed. The second command
+writes results/calibration-seasons.md. Needs numpy.
 """
 
 import argparse
@@ -139,14 +139,14 @@ def run(args):
 
 
 def inside(row, name, level):
-    """Whether the truth is inside; a phase is taken from one side of 0 to the other if need be."""
+    """Whether the truth is inside; a phase is wrapped across 0 if need be."""
     truth, low, high = (row[f"{name}_{what}"] for what in ("true", f"low{level}", f"high{level}"))
     turns = (-1, 0, 1) if name == "phi" else (0,)
     return any(low <= truth + turn <= high for turn in turns)
 
 
 def right(row):
-    """Whether the period is the true one, as far as a season tells."""
+    """Whether the period is the true one within the resolution of a season."""
     periods = (row["porb_over_prot_median"], row["porb_over_prot_true"])
     return calibration_table.same(*(period * ROTATION_D for period in periods), NIGHTS)
 

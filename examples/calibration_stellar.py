@@ -1,16 +1,16 @@
-"""Stellar parameters of simulated stars that change: best values and errors by evolving maps and by one map.
+"""Stellar parameters of simulated stars with evolving spots: best values and errors by evolving and static maps.
 
     python3 examples/calibration_stellar.py --simulator SIMULATOR --simulator target/release/dimcmc \\
         --program target/release/dimcmc
     python3 examples/calibration_stellar.py --table
 
-Stars of random geometry as in calibration_changing.py (inclination 20 to 75 degrees, vsini 15 to 70 km/s, lifetimes of
-7 d to for ever), with a planet. Orbit, rotation, shear, inclination, vsini and the field are free; the search begins at
-values that are off: inclination by up to 15 degrees, vsini by up to 1 km/s, the rate of rotation by up to 0.3 %.
-Best values have errors by the curvature; with `--steps` a short chain of integrated maps follows, most of whose moves
-are independent draws, so that a few hundred are enough. Where no single map comes down to the usual chi2 the target is
-set above what it comes down to, as a user would. A line a star and objective goes to results/calibration/stellar.csv;
-the script can be stopped, and goes on. The second command writes results/calibration-stellar.md. Needs numpy.
+Stars of random geometry as in calibration_changing.py (inclination 20 to 75 degrees, vsini 15 to 70 km/s, lifetimes
+from 7 d to infinity), with a planet. Orbit, rotation, shear, inclination, vsini and the field are free; the search
+begins at values that are off: inclination by up to 15 degrees, vsini by up to 1 km/s, the rate of rotation by up to 0.3
+%. Best values have errors by the curvature; with `--steps` a short chain of evolving maps follows, most of whose moves
+are independent draws, so that a few hundred are enough. Where no static map reaches the usual chi2 the target is set
+above the attainable one, as a user would. One line per star and objective goes to results/calibration/stellar.csv; the
+script can be stopped and resumed. The second command writes results/calibration-stellar.md. Needs numpy.
 """
 
 import argparse
@@ -39,7 +39,7 @@ COLUMNS += ["draws", "accepted", *(f"{prefix}{name}" for name in TOLD for prefix
 BURN_IN, ENSEMBLES, WALKERS = 2, 2, 20
 
 
-# where the target of chi2 is out of reach it becomes this many times what a map comes down to
+# an unattainable target of chi2 is replaced by this many times the lowest chi2 of a map
 ABOVE_FLOOR = 1.03
 # km/s; the table has stars on both sides of it apart
 FAST = 45.0
@@ -69,7 +69,7 @@ def config(truth, folder, objective, seed):
 
 
 def of_chain(out, truth):
-    """What the table has of a chain."""
+    """The columns of a chain in the table."""
     draws = [json.loads(line) for line in (out / "chain.jsonl").read_text().splitlines()]
     draws = [draw for draw in draws if draw["step"] >= BURN_IN]
     line = {"draws": len(draws), "accepted": round(np.mean([draw["accepted"] for draw in draws]), 3)}
@@ -132,7 +132,7 @@ def run(args):
 
 
 def table(args):
-    """Shares of true values within 1 and 2 standard errors, of all stars whose search ended."""
+    """Fractions of true values within 1 and 2 standard errors, for all stars whose search ended."""
     rows = calibration_table.read(args.csv)
     ended = [row for row in rows if not row["error"]]
     discs = [row for row in ended if not row["simulator"].endswith("field")]

@@ -58,7 +58,7 @@ def append(path, columns, line):
 def command(doc, names, columns, one, table, options=()):
     """A calibration as a command: `one` makes the line of a star from its seed and the arguments, `table` the note of
     all lines. `names` are those of folder, table and note, and the number of stars; `options` further arguments of
-    the parser, as a name and what is said of it."""
+    the parser, as a name and its help."""
     work, lines, note, stars = names
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", help="dimcmc")
@@ -85,7 +85,7 @@ def command(doc, names, columns, one, table, options=()):
 
 
 def under_the_head(out, title, text):
-    """Puts tables under the hand-written head of a note, or below its title where there is none yet."""
+    """Inserts tables under the hand-written head of a note, or below its title where there is none yet."""
     mark = "<!-- tables -->\n"
     note = out.read_text() if out.exists() else f"# {title}\n\n"
     out.write_text(f"{note.partition(mark)[0]}{mark}\n{text.rstrip()}\n")
@@ -134,7 +134,7 @@ def of(row, how, name):
 
 
 def has(rows, how):
-    """Stars that the method was tried on."""
+    """Stars on which the method was tested."""
     return [row for row in rows if of(row, how, "false_alarm") is not None]
 
 
@@ -143,7 +143,7 @@ def found(row, how):
 
 
 def same(period_d, true_d, season_d):
-    """Whether a period is the true one, as far as a season tells."""
+    """Whether a period is the true one within the resolution of a season."""
     return abs(1 / period_d - 1 / true_d) < RIGHT / season_d
 
 
@@ -154,7 +154,7 @@ def right(row, how):
 
 
 def share(hits):
-    """A share in per cent with its binomial error."""
+    """A fraction in per cent with its binomial error."""
     hits = [bool(hit) for hit in hits]
     if not hits:
         return "-"
@@ -179,7 +179,7 @@ def turned(row, name):
 
 
 def groups(rows):
-    """Names and stars: all, static and changing ones, and each kind."""
+    """Names and stars: all, static and evolving ones, and each kind."""
     static = [row for row in rows if row["lifetime_d"] == math.inf]
     changing = [row for row in rows if row["lifetime_d"] != math.inf]
     kinds = dict.fromkeys(row["kind"] for row in rows)
@@ -206,7 +206,7 @@ def false_alarms(rows):
 
 
 def inside(pulls):
-    """Shares of pulls inside 68 and 95 % of a normal distribution."""
+    """Fractions of pulls inside 68 and 95 % of a normal distribution."""
     pulls = list(pulls)
     return [share(abs(pull) < bound for pull in pulls) for _, bound in LEVELS]
 
@@ -233,7 +233,7 @@ def at_true_period(rows, bare):
 
 
 def left_over(rows):
-    """Mean squares of what is left over in the velocities, with the error that the scatter between stars gives."""
+    """Mean squares of the residual velocities, with the error from the scatter between stars."""
     names = [name for name in rows[0] if name.startswith("chi2_") and name != "chi2_orbit"]
     lines = []
     for name, group in groups(rows):

@@ -5,8 +5,8 @@
 
 Stars like V830 Tau, TAP 26 and V889 Her take turns: each lifetime, without and with a planet. All stars of a campaign
 have the same times, drawn once within the nights of the campaign; spots, noise and phase of the orbit are each star's.
-Each is searched by evolving maps, by one map that does not change (spottedness), and by a quasi-periodic Gaussian
-process on first moments. `dimcmc plan` forecasts each campaign before the first star. A line a star goes to
+Each is searched by evolving maps, by a static map (spottedness), and by a quasi-periodic Gaussian process on first
+moments. `dimcmc plan` forecasts each campaign before the first star. One line per star goes to
 results/calibration/campaigns.csv, forecasts to campaigns-plan.csv beside it; the script can be stopped at any time and
 goes on where it was. The second command writes results/campaigns.md. Needs numpy, scipy, jax and tinygp; tables, numpy.
 """
@@ -48,7 +48,7 @@ PLAN_COLUMNS = "kind lifetime_d profiles sigma_k_kms k50_kms k95_kms".split()
 
 
 def star(name, lifetime, number, planet):
-    """The star's line of the table as far as it is known before the search, and the simulator's options."""
+    """The star's line of the table before the search, and the simulator's options."""
     campaign = STARS[name]
     cell = 10 * list(STARS).index(name) + LIFETIMES_D.index(lifetime)
     seed = 2_000_000 + 10_000 * cell + 2 * number + planet
@@ -85,7 +85,7 @@ def simulate(program, name, options, folder):
 
 
 def by_moments(row, folder):
-    """What a Gaussian process on first moments finds, and sigma_K at the planet's period."""
+    """Result of a Gaussian process on first moments, and sigma_K at the planet's period."""
     import moments_gp
 
     moments_gp.MOST = 128
@@ -118,7 +118,7 @@ def one(name, lifetime, number, planet, args):
 
 
 def plan(name, lifetime, args):
-    """What `dimcmc plan` forecasts of the planet's period, the lifetime of the spots told."""
+    """Forecast of `dimcmc plan` at the planet's period, with the lifetime of the spots given."""
     found, simulated = config(name, star(name, lifetime, 0, 0)[1])
     for key in ("spots", "random_spots"):
         del simulated[key]
@@ -138,7 +138,7 @@ def plan(name, lifetime, args):
 
 
 def run(args):
-    """Forecasts, then stars until there are enough, those that are in the table left out."""
+    """Runs forecasts, then stars until there are enough, except those in the table."""
     args.work.mkdir(parents=True, exist_ok=True)
     planned = {(row["kind"], row["lifetime_d"]) for row in calibration_table.resumed(args.plan)}
     for lifetime, name in itertools.product(LIFETIMES_D, STARS):
@@ -181,7 +181,7 @@ def detections(rows):
 
 
 def share(hits, of):
-    """A share in per cent with its binomial error; where it is none or all, the 68 % limit."""
+    """A fraction in per cent with its binomial error; where it is 0 or 1, the 68 % limit."""
     if not of:
         return "-"
 
@@ -196,7 +196,7 @@ def share(hits, of):
 
 
 def sigma_there(row, how):
-    """Error of K (m/s) at the planet's period, averaged over phases; None where the method was not tried."""
+    """Error of K (m/s) at the planet's period, averaged over phases; None where the method was not tested."""
     if how == "changing":
         return 1000 * math.sqrt(0.5 * (row["sigma_along_kms"] ** 2 + row["sigma_across_kms"] ** 2))
     value = row[f"{how}_sigma_k_there_kms"]
@@ -209,7 +209,7 @@ def median(values):
 
 
 def forecasts(rows, planned):
-    """Forecasts beside what was achieved, by evolving maps and by the others."""
+    """Forecasts and achieved uncertainties, by evolving maps and by the others."""
     lines = []
     for name, lifetime, group in cells(rows):
         line = next((row for row in planned if (row["kind"], f"{row['lifetime_d']} d") == (name, lifetime)), None)

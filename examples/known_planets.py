@@ -1,4 +1,4 @@
-"""Two transiting planets of one star, and a third that nobody knows of: are their K right, is it found?
+"""Two transiting planets of one star, and an unknown third: are their K right, is it detected?
 
     python3 examples/known_planets.py --program target/release/dimcmc
     python3 examples/known_planets.py --table
@@ -6,14 +6,14 @@
 Each star has 14 spots with a penumbra that evolve, drawn as bright-and-dark pixels by `dimcmc simulate`, which shares
 no field with the evolving maps that are fitted; two planets of 60 and 40 m/s on circular orbits of 3 to 12 d at random
 phases; and some 40 profiles of 16 nights. `dimcmc init` is told rotation period and inclination. Its config gets both
-ephemerides. `dimcmc periodogram` then says what K is, and `dimcmc limits` how often a third planet of 100 m/s would be
-found at a period drawn for each star. `dimcmc inject` puts it in, and another search looks for it. One line per star
-goes to results/calibration/known-planets.csv; the script can be stopped, and goes on. The second command writes
+ephemerides. `dimcmc periodogram` then measures K, and `dimcmc limits` the chance to detect a third planet of 100 m/s at
+a period drawn for each star. `dimcmc inject` injects it, and another search tries to recover it. One line per star goes
+to results/calibration/known-planets.csv; the script can be stopped and resumed. The second command writes
 results/known-planets.md.
 
 With `--simulator stars.py --csv results/calibration/known-planets-physics.csv` stars, spots, lines and the first planet
 are those of a simulator that shares nothing with the program (`stars.py FOLDER --seed N --k KMS`); the second planet is
-put in by `dimcmc inject`.
+injected by `dimcmc inject`.
 """
 
 import json
@@ -40,7 +40,7 @@ COLUMNS = (
 
 
 def star(rng, seed):
-    """The config of a simulation, and what there is to find."""
+    """The config of a simulation, and its truth."""
     first = drawn(rng)
     second = first
     while not 1.4 < max(first, second) / min(first, second):
@@ -90,7 +90,7 @@ def simulated(rng, seed, folder, run):
 
 
 def of_others(rng, seed, folder, run, simulator):
-    """A star of another simulator, which has the first planet; the second is put in."""
+    """A star of another simulator, which has the first planet; the second is injected."""
     words = [sys.executable, simulator, folder / "first", "--seed", seed, "--effect", "none", "--k", K_KMS[0]]
     subprocess.run(list(map(str, words)), check=True, capture_output=True)
     truth = json.loads((folder / "first" / "truth.json").read_text())
@@ -126,7 +126,7 @@ def with_ephemerides(config, planets, times):
 
 
 def chance(folder, period_d):
-    """Share of phases at which THIRD_KMS is recovered there, linear between the cells of `limits`."""
+    """Fraction of phases at which THIRD_KMS is recovered there, linear between the cells of `limits`."""
     rows = [line.split(",") for line in (folder / "limits.csv").read_text().split("\n") if line]
     names, rows = rows[0], [[float(cell) for cell in row] for row in rows[1:]]
     column = {name: [row[k] for row in rows] for k, name in enumerate(names)}

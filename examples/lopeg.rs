@@ -1,11 +1,11 @@
-//! A real star: the orbit that each model of it finds in the profiles of LO Peg, where no planet is known, and orbits
-//! put into them.
+//! A real star: the orbit found by each model in the profiles of LO Peg, where no planet is known, and orbits injected
+//! into them.
 //!
 //!     cargo run --release --example lopeg -- models
 //!     cargo run --release --example lopeg -- injections
 //!
-//! print the tables of `results/lopeg.md`. Chains are kept in `runs/lopeg` and gone on with. The profiles are not part
-//! of this repository: see `configs/lopeg.json` for where they are looked for.
+//! print the tables of `results/lopeg.md`. Chains are kept in `runs/lopeg` and resumed. The profiles are not part of
+//! this repository: `configs/lopeg.json` has their path.
 
 #[path = "reproduce/cases/mod.rs"]
 #[allow(dead_code, unused_imports)]
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// What a model of the star says more than the plain one: a name, and changes of its config.
+/// A model of the star relative to the plain one: a name, and changes of its config.
 type Model = (&'static str, &'static [(&'static str, fn() -> Value)]);
 
 const BRIGHT: (&str, fn() -> Value) = ("/imaging/brightness", || json!("bright-and-dark"));
@@ -51,7 +51,7 @@ const MODELS: [Model; 10] = [
 const RECOMMENDED: Model =
     ("bright and dark, errors measured, unresolved spots", &[BRIGHT, MEASURED, UNRESOLVED_SPOTS]);
 
-/// Orbits that are put in: K (km/s), Porb/Prot, phases.
+/// Injected orbits: K (km/s), Porb/Prot, phases.
 const K_KMS: [f64; 3] = [0.3, 0.6, 1.0];
 const PERIODS: [f64; 2] = [1.7, 2.6];
 const PHASES: [f64; 4] = [0.1, 0.35, 0.6, 0.85];
@@ -78,7 +78,7 @@ fn base() -> Result<Value, Failure> {
     let list = std::path::absolute(Path::new(CONFIG).parent().unwrap_or(Path::new("")).join(list))?;
     let changes = [
         ("/observations/path", json!(list)),
-        // white errors and the entropy's spots, until a model says otherwise
+        // white errors and the entropy's spots, unless a model changes them
         ("/observations/sigma_scale", json!(0.3)),
         ("/imaging/unresolved_spots", json!("entropy")),
         ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": 0.5, "max": 4.0 })),
@@ -132,8 +132,7 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Orbits put in and found at their periods by the recommended model, against what it finds there in the profiles as
-/// they are.
+/// Injected orbits, recovered at their periods by the recommended model, against its result there without an injection.
 fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     let (mut near, mut covered, mut all) = (0, 0, 0);
     println!(
@@ -175,7 +174,7 @@ fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the recommended model finds of an orbit in the profiles that it was put into, its period known.
+/// The orbit recovered by the recommended model from profiles with an injection, its period known.
 fn recovered(laboratory: &Laboratory, base: &Value, orbit: Orbit) -> Result<Outcome, Failure> {
     let name = format!("k_{}_p_{}_phi_{}", orbit.k_kms, orbit.porb_over_prot, orbit.phi);
     let config = with(base, &RECOMMENDED);
@@ -184,7 +183,7 @@ fn recovered(laboratory: &Laboratory, base: &Value, orbit: Orbit) -> Result<Outc
         config,
         &[
             ("/observations/path", json!(list)),
-            // a start that knows the period alone
+            // a start at the known period only
             ("/planet/porb_over_prot", json!(orbit.porb_over_prot)),
             ("/parameters/k_kms/max", json!(2.5)),
         ],
@@ -204,7 +203,7 @@ fn injected(laboratory: &Laboratory, base: &Value, orbit: Orbit, name: &str) -> 
     Ok(std::path::absolute(folder.join("observations.txt"))?)
 }
 
-/// The orbit found as `K (cos, sin)` of its phase, and the error of K.
+/// The orbit found as `K (cos, sin)` of its phase, and the standard error of K.
 fn amplitude(outcome: &Outcome) -> Option<([f64; 2], f64)> {
     let parameters = &outcome.chain.as_ref()?.parameters;
     let (k, phi) = (parameters.get("k_kms")?, parameters.get("phi")?.value);

@@ -1,13 +1,13 @@
-"""What is done without maps: a quasi-periodic Gaussian process on the first moments of the same profiles.
+"""Analysis without maps: a quasi-periodic Gaussian process on the first moments of the same profiles.
 
     python3 examples/moments_gp.py --work target/calibration-changing
 
 For every star of `calibration_changing.py` (rv.csv has its first moments) amplitude, decay and periodic scale of the
 kernel, a jitter and a constant are fitted by maximum likelihood, the rotation period known. Orbits of all periods of
 the blind search follow in closed form, and false-alarm probabilities from draws of the model without a planet. The
-highest peaks are fitted once more together with the kernel; what that gains is held against the same draws, for which
-nothing is fitted: false-alarm probabilities `refit_` are too small, in favour of the process. Appends a line a star to
-results/calibration/changing-moments.csv, and goes on where it was. Needs numpy, scipy, jax and tinygp.
+highest peaks are fitted once more together with the kernel; the gain is compared with the same draws, for which nothing
+is fitted: false-alarm probabilities `refit_` are too small, in favour of the QP-GP. Appends one line per star to
+results/calibration/changing-moments.csv, and resumes where it was. Needs numpy, scipy, jax and tinygp.
 """
 
 import argparse
@@ -25,7 +25,7 @@ import calibration_table
 
 jax.config.update("jax_enable_x64", True)
 
-# stars are filled up to so many profiles by ones that say nothing, so that one compilation does for all
+# stars are padded to this many profiles by ones without information, so that one compilation is enough
 MOST, NOTHING_KMS = 88, 1e4
 # amplitude (km/s), decay (d), gamma of exp(-gamma sin^2), jitter (km/s); where fits begin; peaks fitted once more
 BOUNDS = [(math.log(low), math.log(high)) for low, high in ((1e-3, 3), (1, 1e3), (0.1, 30), (1e-4, 1))]
@@ -56,7 +56,7 @@ def misfit(kernel, star, x):
 
 
 def fit(star, x, starts):
-    """ln of the kernel's numbers of largest likelihood, and -ln L."""
+    """ln of the maximum-likelihood parameters of the kernel, and -ln L."""
 
     def both(kernel):
         value, slope = misfit(kernel, star, x)
@@ -68,7 +68,7 @@ def fit(star, x, starts):
 
 
 def load(folder, rotation_d):
-    """A star filled up, and the number of its profiles."""
+    """A padded star, and the number of its profiles."""
     rv = np.genfromtxt(folder / "changing" / "rv.csv", delimiter=",", names=True)
     fill = MOST - len(rv)
     return {
@@ -108,8 +108,8 @@ def heights(white, y):
 
 
 class FalseAlarms:
-    """How often draws without a planet show such a peak. Beyond the draws, from as many independent periods as give the
-    highest of 1 % of them."""
+    """False-alarm probability of a peak from draws without a planet. Beyond the draws, from as many independent periods
+    as give the highest of 1 % of them."""
 
     def __init__(self, white, random):
         draws = [random.normal(size=(white.shape[1], 1000)) for _ in range(DRAWS // 1000)]

@@ -1,9 +1,9 @@
-//! The sampler with and without the surrogate move: the same posterior, at what cost? Also where the surrogate is poor.
+//! The sampler with and without the surrogate move: cost for the same posterior, also where the surrogate is poor.
 //!
 //!     cargo run --release --example moves
 //!
 //! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where
-//! there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
+//! there is one), or `configs/paper_7d.json`; a part of a name after `--` runs only that case.
 
 use dimcmc::internals::sampling::chain::{MoveKind, Summary};
 use dimcmc::{Config, Run, Scene};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Name, config, what is changed in it.
+/// Name, config, changes of it.
 fn cases() -> Vec<(&'static str, &'static str, Value)> {
     let fine = json!({ "imaging": { "pixels": 5000 } });
     let planet = |k: f64, period: f64| {
@@ -81,7 +81,7 @@ fn row(summary: &Summary) -> String {
     format!("{} | {worth} | {accepted} | {}", summary.evaluations, parameters.join(", "))
 }
 
-/// Puts the members of `change` into `value`, objects member by member.
+/// Merges the members of `change` into `value`, objects member by member.
 fn merge(value: &mut Value, change: &Value) {
     match (value, change) {
         (Value::Object(value), Value::Object(change)) => {

@@ -1,12 +1,12 @@
-//! What `dimcmc plan` forecasts, against what simulated campaigns achieve: stars with random spots that come and go,
-//! each with nights, spots and noise of its own, the field of spots fitted to its profiles. A line a star, then how
-//! achieved errors of K compare with those forecast from usual spots, the same with the lifetime of these, the spots of
-//! most of these stars, and those fitted to the star itself.
+//! Forecasts of `dimcmc plan` against simulated campaigns: stars with random, evolving spots, each with its own nights,
+//! spots and noise, the field of spots fitted to its profiles. Output: one line per star, then the ratio of achieved
+//! uncertainties of K to those forecast from default spots, the same with the lifetime of these, the spots of most of
+//! these stars, and those fitted to the star itself.
 //!
 //!     RAYON_NUM_THREADS=1 cargo run --release --example plan_check -- 50 > fits.txt
 //!     RAYON_NUM_THREADS=1 cargo run --release --example plan_check -- 50 fits.txt
 //!
-//! The second line takes the fields from the first one's output, which makes minutes of most of an hour.
+//! The second line takes the fields from the first one's output, which takes minutes instead of most of an hour.
 
 use dimcmc::Config;
 use dimcmc::internals::data::scene::Scene;
@@ -45,7 +45,7 @@ fn star(seed: u64) -> Config {
 /// Lifetime of a field for spots that live 15 d: 0.8 of that (`results/calibration-changing.md`).
 const LIFETIME_D: f64 = 12.0;
 
-/// sigma_K as forecast for a star with these spots.
+/// Forecast sigma_K for a star with these spots.
 fn forecast(campaign: &Campaign, assumed: Assumed, range: [f64; 2], per_cycle: &[f64], maps: usize) -> Vec<f64> {
     let campaign = Campaign { assumed, ..campaign.clone() };
     let settings = PlanSettings { maps, draws: 1000, seed: 1, fixed: false };
@@ -89,7 +89,7 @@ fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Median, and half of what lies between the 16th and the 84th of a hundred.
+/// Median, and half the range from the 16th to the 84th percentile.
 fn spread(values: &[f64]) -> (f64, f64) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

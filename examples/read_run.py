@@ -20,7 +20,7 @@ import xarray as xr
 run = Path(sys.argv[-1]) if Path(sys.argv[-1]).is_dir() else Path("runs/demo")
 
 # %% [markdown]
-# The chain as it is, without any export: a row for each ensemble, step and walker.
+# The chain itself, without any export: a row for each ensemble, step and walker.
 
 # %%
 chain = pd.read_json(run / "chain.jsonl", lines=True)

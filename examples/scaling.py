@@ -1,7 +1,7 @@
-"""A simulated cluster: how many evaluations a second a chain gets out of 10 to 10,000 ranks.
+"""A simulated cluster: evaluations per second of a chain on 10 to 10,000 ranks.
 
 Events are those of the program: rank 0 proposes for one half of all walkers, hands the vectors out, some ahead while
-there are many, takes the answers as they come, decides and writes; then the other half. What things take is measured by
+there are many, takes the answers as they come, decides and writes; then the other half. Durations are measured by
 `cargo bench --bench ranks
 --features mpi` (the last tables and line). Prints the tables of results/scaling.md. Needs Python alone.
 """
@@ -35,7 +35,7 @@ class Batch:
         self.answers = []
 
     def send(self, worker):
-        """A question to a worker, which begins with it when it has done what it has."""
+        """A request to a worker, which begins with it after its earlier ones."""
         self.clock += SERVICE / 2
         took = self.speed[worker] * self.median * math.exp(self.rng.gauss(0.0, self.spread))
         self.until[worker] = max(self.until[worker], self.clock + LATENCY) + took
@@ -43,13 +43,13 @@ class Batch:
         self.left, self.open[worker], self.work = self.left - 1, self.open[worker] + 1, self.work + took
 
     def ahead(self):
-        """Questions that a worker may have ahead: fewer the longer they take, and the fewer are left."""
+        """Requests that a worker may have queued: fewer the longer they take, and the fewer remain."""
         if self.left <= self.workers:
             return 0
         return max(1, min(AHEAD, int(BRIDGED / self.median), self.left // (2 * self.workers)))
 
     def run(self):
-        """Seconds, and seconds of work, until all answers are back."""
+        """Seconds, and seconds of work, until all results are back."""
         for worker in range(len(self.speed)):
             self.send(worker)
         for _ in range(AHEAD):
@@ -66,7 +66,7 @@ class Batch:
 
 
 def throughput(walkers, ranks, case, steps):
-    """Evaluations a second, and the share of the workers' time that is work."""
+    """Evaluations per second, and the fraction of the workers' time that is work."""
     _, median, spread = case
     rng = random.Random(1)
     halves = [Batch(walkers // 2, ranks - 1, median, spread, rng).run() for _ in range(2 * steps)]

@@ -1,12 +1,12 @@
-"""Profiles of a star whose spots change in one of three ways: what a calibration may hang on.
+"""Profiles of a star whose spots evolve in one of three ways, on which a calibration may depend.
 
     python3 examples/simulate_spots.py OUT --how field --seed 1 --lifetime 15 [--k 0.1 --porb-over-prot 1.7 --phi 0.3]
 
-`field`: the Gaussian field that `dimcmc` integrates out (Matern 3/2 in time). `fading`: discs that keep their size
+`field`: the Gaussian field that `dimcmc` marginalises over (Matern 3/2 in time). `fading`: discs that keep their size
 while their filling factor grows and falls. `shrinking`: discs that keep their filling factor while their area does.
-Discs are at their largest at random times; `--lifetime` is the full width at half of it, `inf` keeps them. A simulator
-of calibration_changing.py, whose options it has: `--simulator 'examples/simulate_spots.py --how field'`. Needs numpy
-and scipy.
+Discs are at their largest at random times; `--lifetime` is the full width at half of it, `inf` makes them static. A
+simulator of calibration_changing.py, whose options it has: `--simulator 'examples/simulate_spots.py --how field'`.
+Needs numpy and scipy.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from scipy.special import sph_harm_y
 
 LINE_SIGMA_KMS, WIDTH_KMS, LIMB_DARKENING = 2.5, 5.8, 0.65
 PHOTOSPHERE_K, SPOT_K, WAVELENGTH_NM = 5500.0, 3500.0, 550.0
-# of the field, as fitted to stars with discs: standard deviation, slope of the spectrum, degree, mean, and its lifetime
+# of the field, as fitted to stars with discs: standard deviation, power-law index, degree, mean, and its lifetime
 # over that of the discs
 AMPLITUDE, SLOPE, DEGREE, MEAN, LIFETIME = 0.24, 0.5, 36, 0.06, 0.8
 SPOTS, EDGE_DEG = 12, 0.7
@@ -33,7 +33,7 @@ def contrast():
 
 
 def grid(rows=104):
-    """Longitude, latitude (rad) and share of the sphere of some 14,000 pixels."""
+    """Longitude, latitude (rad) and fraction of the sphere of some 14,000 pixels."""
     latitudes = (np.arange(rows) + 0.5) / rows * np.pi - np.pi / 2
     each = np.maximum(3, np.round(2 * rows * np.cos(latitudes))).astype(int)
     longitude = np.concatenate([(np.arange(n) + 0.5) / n * 2 * np.pi for n in each])

@@ -2,8 +2,8 @@
 //!
 //! The idea is that of Petit et al. 2015 (*A maximum entropy approach to detect close-in giant planets around active
 //! stars*, A&A 584, A84): a wrong orbit shifts the line profiles against each other, and the map that fits them needs
-//! more spots. Here the spots are marginalised and the orbit is sampled, instead of being read off a grid. All formulas
-//! are in `docs/method.md`.
+//! more spots. Here the spots are marginalised over and the orbit is sampled, instead of being read off a grid. All
+//! formulas are in `docs/method.md`.
 //!
 //! # The rooms
 //!
@@ -15,8 +15,8 @@
 //! | `star` | geometry, rotation, local line, spots, orbit, and the response: a brightness map to line profiles |
 //! | `maxent` | entropies and the maximum-entropy solver (Skilling & Bryan 1984) |
 //! | `field` | Gaussian fields on the sphere and in time, marginalised over |
-//! | `planets` | planets in the velocities of the profiles: periodograms, false alarms, limits, verdicts |
-//! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, landscapes |
+//! | `planets` | planets in the velocities of the profiles: periodograms, false-alarm probabilities, limits, verdicts |
+//! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, likelihood grids |
 //! | `model` | the parameters: their table, priors, sampling coordinates |
 //! | `surface` | what spots do to profiles: static and evolving maps behind one interface |
 //! | `inference` | the blind search, the best parameters, Bayes factors |
@@ -64,12 +64,12 @@
 //! # }
 //! ```
 //!
-//! Profiles that are at hand as numbers take the place of files by [`Scene::with_profiles`]; [`Run::new_in`] keeps the
-//! chain in a folder, where `dimcmc` goes on with it.
+//! Profiles in memory replace files by [`Scene::with_profiles`]; [`Run::new_in`] keeps the chain in a folder, where
+//! `dimcmc` can resume it.
 //!
 //! # Any density
 //!
-//! The sampler knows nothing of stars. What it samples is a [`LogDensity`].
+//! The sampler is independent of stars: it samples any [`LogDensity`].
 //!
 //! ```
 //! use dimcmc::{Evaluation, LogDensity, SamplerSettings, sample};
@@ -98,7 +98,7 @@
 //! # }
 //! ```
 
-// a stream that is gone makes the macros of the standard library panic: see `cli::console`
+// a closed stream makes the macros of the standard library panic: see `cli::console`
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod cli;
@@ -119,7 +119,7 @@ mod surface;
 #[doc(hidden)]
 pub mod internals {
     #![allow(missing_docs)]
-    // what a program beside the commands needs to behave as they do
+    // what another program needs to behave like the commands
     pub mod cli {
         pub use crate::cli::{Global, cluster, console, progress, signals};
     }

@@ -1,8 +1,8 @@
 //! Several ranks by MPI, with `mpirun` on this machine: the same bytes as by threads, whatever happens on the way, and
 //! no job that hangs.
 //!
-//! Without a test harness: `mpirun` starts this very program too, as ranks of jobs that go wrong on purpose (`ranks`).
-//! Without `mpirun` it says `skipped`, and fails where `CI` is set.
+//! Without a test harness: `mpirun` also starts this program as ranks of jobs that fail on purpose (`ranks`). Without
+//! `mpirun` it prints `skipped`, and fails where `CI` is set.
 
 #[path = "common/desk.rs"]
 #[allow(unused)]
@@ -72,12 +72,12 @@ fn config() -> Value {
     config
 }
 
-/// A program on so many ranks.
+/// A program on this many ranks.
 fn mpirun(desk: &Desk, ranks: usize, program: &str, args: &[&str]) -> Command {
     let mut command = Command::new("mpirun");
     command.args(["--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-n", &ranks.to_string(), program]);
     command.args(args).current_dir(desk.path("")).stdout(Stdio::piped()).stderr(Stdio::piped());
-    // Open MPI's launcher sleeps for a second between SIGTERM and SIGKILL, now and then even with nobody left to kill
+    // Open MPI's launcher sleeps for a second between SIGTERM and SIGKILL, sometimes even with no process left to kill
     command.env("OMPI_MCA_odls_base_sigkill_timeout", "0").env("DIMCMC_CACHE", "off");
     command
 }
@@ -128,7 +128,7 @@ fn any_number_of_ranks() {
     same(&desk, &RUN, "prior", "prior_3");
 }
 
-/// What a rank makes of a config comes from the config alone, whatever it asks for.
+/// The result of a rank depends only on the config.
 fn other_models() {
     for (pointer, value) in [
         ("/imaging/unresolved_spots", json!("fitted")),
@@ -162,7 +162,7 @@ fn limits() {
     same(&desk, &["limits.csv", "limits.json"], "a", "b");
 }
 
-/// The process of a rank of a job.
+/// The system process of one rank in a job.
 fn rank_of(mpirun: &Child, rank: usize) -> String {
     let is_it = |pid: &String| {
         let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
@@ -188,7 +188,7 @@ fn sampling(desk: &Desk, out: &str) -> Child {
     job
 }
 
-/// A chain long enough to be interrupted, and what it comes to at step 60.
+/// A chain long enough to be interrupted, and its state at step 60.
 fn long_and_short(desk: &Desk) {
     desk.succeed(&["sample", CONFIG, "--out", "whole"]);
     desk.set("/sampler/steps", json!(100_000));

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
-/// What is free.
+/// The free parameters.
 #[derive(Clone, Copy)]
 pub enum Free {
     /// The orbit: K, period, phase.
@@ -84,7 +84,7 @@ pub fn uneven_map(pixels: usize) -> Vec<f64> {
     (0..pixels).map(|p| 0.8 + 0.2 * (0.7 * p as f64).sin()).collect()
 }
 
-/// Passes alone: maps and profiles are there before the time is taken.
+/// Passes alone: maps and profiles are made before the timing.
 pub struct Passes {
     from: [Vec<f64>; 3],
     to: [Vec<f64>; 3],
@@ -110,7 +110,7 @@ impl Passes {
         black_box(&self.to);
     }
 
-    /// That many passes there and back in single precision.
+    /// That many passes, forward and back, in single precision.
     pub fn run_single(&mut self, response: &Response, passes: u32) {
         let [x, map] = &mut self.single;
         for _ in 0..passes / 2 {
@@ -120,10 +120,11 @@ impl Passes {
     }
 }
 
-/// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.
+/// A posterior and points drawn from its bulk: a Gaussian around the maximum, with the covariance from the curvature
+/// there.
 pub struct Bulk {
     pub posterior: Posterior,
-    /// What a chain samples: the posterior with its warm starts.
+    /// The density of a chain: the posterior with its warm starts.
     pub target: Density,
     pub points: Vec<Vec<f64>>,
 }

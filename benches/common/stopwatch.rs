@@ -1,10 +1,10 @@
-//! Times of things that are compared with each other: in turn within one run, so that whatever else the machine is
-//! doing slows all of them alike.
+//! Timing of candidates that are compared: in turn within one run, so that other load of the machine slows all of them
+//! alike.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Something to be timed.
+/// A candidate for timing.
 pub struct Candidate<'a> {
     pub name: &'static str,
     pub run: Box<dyn FnMut() + 'a>,
@@ -16,7 +16,7 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// Seconds that `f` takes.
+/// Seconds taken by `f`.
 pub fn seconds<R>(f: impl FnOnce() -> R) -> f64 {
     let began = Instant::now();
     black_box(f());
@@ -36,7 +36,7 @@ pub fn in_turn(candidates: &mut [Candidate], rounds: usize, runs: usize) -> Vec<
     times
 }
 
-/// The value below which a share `p` of the values lies.
+/// The value below which a fraction `p` of the values lies.
 pub fn quantile(values: &[f64], p: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -45,7 +45,7 @@ pub fn quantile(values: &[f64], p: f64) -> f64 {
     sorted[below] + share * (sorted[position.ceil() as usize] - sorted[below])
 }
 
-/// What a machine shared with others comes to when they leave it alone for a round.
+/// The time in the least disturbed round on a shared machine.
 pub fn fastest(times: &[f64]) -> f64 {
     times.iter().copied().fold(f64::INFINITY, f64::min)
 }

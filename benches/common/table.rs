@@ -1,6 +1,6 @@
 //! Markdown tables, and whether a number meets its target.
 
-/// What a number is held to.
+/// The target of a number.
 #[derive(Clone, Copy)]
 pub enum Target {
     AtMost(f64),
@@ -45,7 +45,7 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// Prints the table; `note` says what the numbers are.
+    /// Prints the table; `note` explains the numbers.
     pub fn print(&self, note: &str) {
         let columns = self.rows[0].len();
         let width = |c: usize| self.rows.iter().map(|row| row[c].chars().count()).max().unwrap_or(0);

@@ -1,7 +1,7 @@
-//! Stars whose spots come and go, with and without a planet, searched blindly by two objectives: one map of least spots
-//! for all nights, and the marginal likelihood, for which maps change and are integrated over.
+//! Stars with evolving spots, with and without a planet, searched blindly by two objectives: one static map of least
+//! spots for all nights, and the marginal likelihood, marginalised over evolving maps.
 //!
-//! Star and line are known; the errors of the profiles are measured. A star has the same nights, noise and orbit
+//! Star and line are known; the uncertainties of the profiles are measured. A star has the same nights, noise and orbit
 //! whatever the lifetime of its spots.
 
 use crate::cases::case::is_of_the_star;
@@ -23,13 +23,13 @@ use std::time::Instant;
 /// Periods closer than this many inverse time bases are the same.
 const SAME_PERIOD: f64 = 0.5;
 
-/// Periods within this share of the rotation period are near co-rotation, where sigma_K is another one.
+/// Periods within this share of the rotation period are near co-rotation, where sigma_K differs.
 const NEAR: f64 = 0.15;
 
 /// Name of the row's raw results.
 const ROW: &str = "changing";
 
-/// Lifetimes of the spots (d); none for ever. Spots on a star at a time: those that come and go have half of their
+/// Lifetimes of the spots (d); none for static spots. Spots on a star at a time: evolving ones have half of their
 /// largest area in the mean.
 const LIFETIMES_D: [Option<f64>; 3] = [None, Some(45.0), Some(15.0)];
 const SPOTS_FOR_EVER: usize = 12;
@@ -39,10 +39,10 @@ const SPOTS_AT_A_TIME: usize = 16;
 const K_KMS: f64 = 0.1;
 const PERIODS: (f64, f64) = (0.5, 4.0);
 
-/// Objectives, and what the columns of their results begin with.
+/// Objectives, and the prefixes of the columns of their results.
 const OBJECTIVES: [(&str, &str); 2] = [("spottedness", "one_map"), ("marginal-likelihood", "integrated")];
 
-/// What a column of an objective ends with. Findings: 0 that no planet is needed, 1 a candidate, 2 a detection.
+/// Suffixes of the columns of an objective. Findings: 0 no significant signal, 1 a candidate, 2 a detection.
 const RESULTS: [&str; 8] = [
     "false_alarm",
     "log10_false_alarm",
@@ -54,7 +54,7 @@ const RESULTS: [&str; 8] = [
     "median_sigma_k_kms",
 ];
 
-/// One star to be searched.
+/// One star for a search.
 #[derive(Clone, Copy)]
 struct Star {
     lifetime_d: Option<f64>,
@@ -62,24 +62,24 @@ struct Star {
     seed: u64,
 }
 
-/// What a search comes to.
+/// The result of a search.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Searched {
-    /// Of the search alone, whatever is said of the change.
+    /// The verdict of the search, ignoring remarks on spot evolution.
     verdict: Verdict,
     porb_over_prot: f64,
     /// Whether that is the period of the planet, to half the inverse time base.
     is_right: bool,
     /// sigma_K (km/s), its median over all periods away from that of the rotation.
     median_sigma_k_kms: Option<f64>,
-    /// ln Z of a star that changes over that of one that does not, where they are compared.
+    /// Difference in ln Z between evolving and static spots, where they are compared.
     change: Option<f64>,
     /// Lifetime of the fitted field (d).
     lifetime_d: Option<f64>,
     seconds: f64,
 }
 
-/// What both objectives say of a star, or why one says nothing.
+/// The results of both objectives for a star, or why one has none.
 type OfStar = Vec<Result<Searched, String>>;
 
 impl Star {
@@ -97,7 +97,7 @@ impl Star {
         [if self.has_planet { K_KMS } else { 0.0 }, period, phi]
     }
 
-    /// The config that it is simulated by.
+    /// The config of its simulation.
     fn simulated(&self, laboratory: &Laboratory) -> Value {
         let number = if self.lifetime_d.is_some() { SPOTS_AT_A_TIME } else { SPOTS_FOR_EVER };
         let [k_kms, porb_over_prot, phi] = self.orbit();
@@ -117,7 +117,7 @@ impl Star {
         with(paper(), &changes)
     }
 
-    /// What both objectives say of it; its profiles are kept in `folder`.
+    /// The results of both objectives; its profiles are stored in `folder`.
     fn searched(&self, config: &Value, folder: &Path) -> Result<OfStar, Failure> {
         let at = |config: Value| Config::at(config, &folder.join("config.json"));
         let observations = Scene::new(&at(config.clone()))?.observations;
@@ -173,7 +173,7 @@ impl Searched {
             Finding::NotJudged => f64::NAN,
         };
         let false_alarm = self.false_alarm();
-        // what is smaller than all doubles is shown as the smallest
+        // an underflow is shown as the smallest double
         let log10 = false_alarm.max(f64::MIN_POSITIVE).log10();
         let [k_kms, sigma_k_kms] = self.verdict.signal.map_or([f64::NAN; 2], |s| [s.k_kms, s.sigma_k_kms]);
         let is_right = f64::from(self.is_right);
@@ -245,7 +245,7 @@ fn row(group: usize, star: &Star, result: &OfStar) -> Vec<f64> {
     numbers
 }
 
-/// False alarms of stars without a planet, the K of those with one.
+/// Spurious detections of stars without a planet, the K of those with one.
 fn panel(group: usize, lifetime: &str, has_planet: bool) -> Panel {
     let series = |(objective, name): &(&str, &str)| Series {
         name: objective.replace('-', " "),
@@ -263,7 +263,7 @@ fn panel(group: usize, lifetime: &str, has_planet: bool) -> Panel {
     }
 }
 
-/// What each objective makes of the stars of a group.
+/// Summary of each objective for the stars of a group.
 fn sum_up(results: &[OfStar], has_planet: bool) -> Value {
     let of_objective = |k: usize| {
         let found: Vec<&Searched> = results.iter().filter_map(|result| result[k].as_ref().ok()).collect();

@@ -1,7 +1,7 @@
-//! Whether intervals are what they say: the share of injected values inside the chain's 68 and 95 % intervals, over
-//! spot maps and noise seeds, for each way to judge a reconstruction.
+//! Coverage of intervals: the fraction of injected values inside the chain's 68 and 95 % intervals, over spot maps and
+//! noise seeds, for each objective of reconstructions.
 //!
-//! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says.
+//! Orbits are drawn from the prior of the chain, so that an exact posterior has nominal coverage.
 
 use crate::cases::{Case, ENDS, Estimate, Failure, Laboratory, Outcome, paper, share, with};
 use crate::report::{Panel, Report, Series};
@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Map, Value, json};
 
-/// What a reconstruction is judged by.
+/// Objectives of reconstructions.
 struct Judge {
     name: &'static str,
     objective: &'static str,
@@ -98,7 +98,7 @@ fn injected(config: &Value, name: &str) -> f64 {
     config["planet"][name].as_f64().unwrap_or(f64::NAN)
 }
 
-/// Shares of the stars inside the intervals, with their binomial errors, for all periods, away from co-rotation and
+/// Fractions of the stars inside the intervals, with their binomial errors, for all periods, away from co-rotation and
 /// near it.
 fn shares(configs: &[Value], outcomes: &[Outcome]) -> Value {
     let is_near = |config: &Value| (injected(config, "porb_over_prot") - 1.0).abs() < NEAR;
@@ -153,12 +153,11 @@ fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, Failure> 
     attainable(laboratory, config)
 }
 
-/// lambda of the image that has the target chi2, over the number of data; the paper's star at 0.97 has 1.6.
+/// lambda of the image at the target chi2, over the number of data; the paper's star at 0.97 has 1.6.
 const LAMBDA: f64 = 3.0;
 
 /// `config` with a target chi2 that its image attains: that of the image where lambda is [`LAMBDA`] over the number of
-/// data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would make noise of
-/// the spots.
+/// data. The lowest attainable chi2 depends on the noise realisation, and at a target near it spots would fit noise.
 pub fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, Failure> {
     let scene = Scene::new(&Config::at(config.clone(), &laboratory.folder.join("config.json")))?;
     let image = Reference::at_lambda(&scene.imager, scene.settings.values, LAMBDA)?;

@@ -13,7 +13,7 @@ pub fn write(report: &Report, row: &str, folder: &Path) -> Result<Vec<String>, F
     let mut figures: Vec<Figure> = figure(report, row).into_iter().collect();
     for drawn in &report.drawn {
         for mut figure in plot::figures(&drawn.folder, drawn.chain.as_deref())? {
-            // traces and autocorrelations are for whoever has the chain
+            // traces and autocorrelations require the chain
             if figure.name == "corner" || figure.name == "landscape" {
                 figure.name = format!("{}_{}", drawn.name, figure.name);
                 figures.push(figure);
@@ -28,7 +28,7 @@ pub fn write(report: &Report, row: &str, folder: &Path) -> Result<Vec<String>, F
     figures.iter().map(write).collect()
 }
 
-/// The figure of its table; none if that is not for the eye.
+/// The figure of its table; none if that is not meant for plotting.
 pub fn figure(report: &Report, row: &str) -> Option<Figure> {
     let mut panels: Vec<ScatterPanel> = report.figure.iter().map(|panel| drawn(panel, report)).collect();
     // one legend serves all panels of the same series
@@ -54,7 +54,7 @@ fn drawn(panel: &Panel, report: &Report) -> ScatterPanel {
         shown().map(|row| row[k]).collect()
     };
     let x = column(&panel.x);
-    // what lies in the same place is moved apart by a hundredth of the axis
+    // coinciding points are separated by a hundredth of the axis
     let reach = x.iter().copied().fold(f64::NEG_INFINITY, f64::max) - x.iter().copied().fold(f64::INFINITY, f64::min);
     let aside = if panel.joined { 0.0 } else { 0.012 * reach };
     let middle = 0.5 * (panel.series.len() as f64 - 1.0);

@@ -1,4 +1,4 @@
-//! R1 and R2: the radial velocities of a spotted star, and what is left of them once the image is taken out.
+//! R1 and R2: the radial velocities of a spotted star, and their residuals after subtraction of the image.
 
 use crate::cases::{Failure, Laboratory, paper, with};
 use crate::report::{Panel, Report, Series};
@@ -75,8 +75,7 @@ pub fn profiles(laboratory: &Laboratory) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// R2: observed minus modelled first moments, without a planet; with one that the image knows, and one that it does
-/// not.
+/// R2: observed minus modelled first moments, without a planet; with one included in the image, and one that is not.
 pub fn filtered(laboratory: &Laboratory) -> Result<Report, Failure> {
     let injected = |k: f64| ("/observations/simulate/truth/k_kms", json!(k));
     let assumed = |k: f64| ("/planet/k_kms", json!(k));
@@ -93,7 +92,7 @@ pub fn filtered(laboratory: &Laboratory) -> Result<Report, Failure> {
         let scene = scene(laboratory, &changes)?;
         let settings = &scene.settings;
         let target = scene.chi2_target;
-        // without its planet a star may not be fitted that well: then as well as it can be without turning noise into
+        // without its planet a star may not be fitted that well: then as well as possible without fitting noise by
         // spots
         let reference = Reference::build(&scene.imager, settings.values, target)
             .or_else(|_| Reference::provisional(&scene.imager, settings.values, target))?;

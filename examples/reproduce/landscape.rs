@@ -1,4 +1,4 @@
-//! R3: the landscape in three dimensions and in slices, and the chain of the same data beside it.
+//! R3: the likelihood grid in three dimensions and in slices, and the chain of the same data.
 
 use crate::cases::{Failure, Laboratory, case, paper, with};
 use crate::report::{Drawn, Report};
@@ -18,7 +18,7 @@ pub fn landscape(laboratory: &Laboratory) -> Result<Report, Failure> {
     let changes = [
         ("/imaging/pixels", json!(laboratory.full_or_quick(20_000, 1000))),
         ("/sampler/walkers", json!(6)),
-        // a median to a twelfth of its error bar, a width to six per cent
+        // median to a twelfth of its error bar, width to six per cent
         ("/sampler/ess", json!(laboratory.full_or_quick(250, 200))),
         ("/sampler/rhat", json!(laboratory.full_or_quick(1.02, 1.05))),
     ];
@@ -76,7 +76,7 @@ pub fn landscape(laboratory: &Laboratory) -> Result<Report, Failure> {
     let chain_folder = Some(folder.join("chain"));
     let slices_drawn = AXES.iter().map(|(fixed, ..)| format!("slice_{fixed}"));
     for name in std::iter::once("grid".to_owned()).chain(slices_drawn) {
-        // a chain over all parameters says nothing of a slice at one of them
+        // a chain over all parameters does not apply to a slice at one of them
         let chain = chain_folder.clone().filter(|_| name == "grid");
         report.drawn.push(Drawn { folder: folder.join(&name), name, chain });
     }

@@ -4,8 +4,8 @@
 //!     cargo run --release --example reproduce -- R1
 //!
 //! A row of `rows.rs` is data: its stars (`cases::paper` is the paper's, changed key by key), and which of the three
-//! routes to an orbit each of them takes (`cases::Case`): grid and paraboloid, chain, periodogram. A
-//! `cases::Laboratory` runs them and keeps what is done. `results/README.md` puts every number beside the paper's.
+//! methods for an orbit is used for each (`cases::Case`): grid and paraboloid, chain, periodogram. A
+//! `cases::Laboratory` runs them and stores results. `results/README.md` compares every number with the paper's.
 
 mod cases;
 mod changing;
@@ -63,7 +63,7 @@ struct Args {
     list: bool,
 }
 
-/// How the program is called.
+/// The command line of the program.
 const COMMAND: &str = "cargo run --release --example reproduce --";
 
 const EXAMPLE: &str = "Example:\n  cargo run --release --example reproduce -- R2 --quick --out runs/reproduced --work \
@@ -96,7 +96,7 @@ fn run(args: &Args) -> Result<(), Failure> {
             console::line(format_args!("{}: done before: {}; --force does it again", row.name, shown(&folder)));
             continue;
         }
-        // what is wrong with the folder is to be known before, not after
+        // report errors of the folder before, not after
         std::fs::create_dir_all(&folder).map_err(|e| Failure::failed(format!("{}: {e}", folder.display())))?;
         if args.force {
             remove(&work.join(row.name))?;
@@ -120,7 +120,7 @@ fn run(args: &Args) -> Result<(), Failure> {
             threads: rayon::current_num_threads(),
         };
         result.write(row, &made, &folder).map_err(Failure::failed)?;
-        // without its figures a row is not done
+        // a row is not finished without its figures
         let figures = figure::write(&result, row.name, &folder).map_err(|error| {
             let _ = std::fs::remove_file(folder.join(SUMMARY));
             Failure::failed(error)
@@ -135,7 +135,7 @@ fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl Args {
-    /// Folders of the results, and of chains and landscapes.
+    /// Folders of the results, and of chains and likelihood grids.
     fn folders(&self) -> [PathBuf; 2] {
         let or = |given: &Option<PathBuf>, full: &str, quick: &str| {
             given.clone().unwrap_or_else(|| PathBuf::from(if self.quick { quick } else { full }))

@@ -1,8 +1,7 @@
-//! Stars that are more than spots on a quiet photosphere: faculae, a line with wings, a continuum that wanders; each
-//! analysed with the model that it was made by and with the plain one.
+//! Stars beyond spots on a quiet photosphere: faculae, a line with wings, a varying continuum; each analysed with its
+//! true model and with the plain one.
 //!
-//! What a wrong model costs: bias of K and coverage of its intervals. Every noise seed has a spot map and a phase of
-//! its own.
+//! Cost of a wrong model: bias of K and coverage of its intervals. Every noise seed has its own spot map and phase.
 
 use crate::cases::{Case, ENDS, Estimate, Failure, Laboratory, Outcome, paper, share, with};
 use crate::coverage::{attainable, random_spots};
@@ -17,12 +16,12 @@ use std::collections::BTreeMap;
 /// A change of a config: where (JSON pointer), and what.
 type Changes = Vec<(&'static str, Value)>;
 
-/// What a star is besides spots, and what a model has to be told of it.
+/// A property of a star beyond spots, with the change of the model for it.
 struct Kind {
     name: &'static str,
-    /// Of the star that is simulated.
+    /// Changes of the simulated star.
     star: fn(&mut ChaCha8Rng) -> Changes,
-    /// Of the model that is right.
+    /// Changes of the true model.
     model: fn() -> Changes,
 }
 
@@ -75,7 +74,7 @@ pub fn models(laboratory: &Laboratory) -> Result<Report, Failure> {
         let simulated: Vec<(Value, f64)> =
             (0..seeds).map(|seed| star(laboratory, kind, seed)).collect::<Result<_, _>>()?;
         let right = (kind.model)();
-        // the plain model is the right one of a star that has spots alone
+        // the plain model is true for a star with only spots
         let models = [(0.0, Vec::new()), (1.0, right)];
         for (is_right, model) in models.into_iter().filter(|(is_right, model)| *is_right == 0.0 || !model.is_empty()) {
             let way = if is_right == 1.0 { "right" } else { "plain" };
@@ -104,7 +103,7 @@ pub fn models(laboratory: &Laboratory) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Bias and scatter of K, its mean error bar, and the shares of intervals that hold the truth.
+/// Bias and rms of K, its mean error bar, and the coverage of intervals.
 fn sum_up(outcomes: &[Outcome]) -> Value {
     let found = outcomes.iter().filter_map(|outcome| {
         let estimate = outcome.by_chain("k_kms")?;
@@ -155,7 +154,7 @@ fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64),
     let folder = laboratory.folder(&format!("models/{}_data_{seed}", kind.name))?;
     let observations = Scene::new(&Config::at(simulated, &folder.join("config.json")))?.observations;
     lsd::write(&folder, &observations)?;
-    // the same file for whoever reads the config from elsewhere
+    // an absolute path for readers of the config in other folders
     let path = std::path::absolute(folder.join("observations.txt")).unwrap_or_else(|_| folder.join("observations.txt"));
     Ok((with(plain, &[("/observations", json!({ "path": path }))]), phi))
 }

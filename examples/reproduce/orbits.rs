@@ -1,7 +1,7 @@
-//! R4 to R11, and co-rotation: the orbit of one planet under changing circumstances, each star by three routes.
+//! R4 to R11, and co-rotation: the orbit of one planet under varied conditions, each star by three methods.
 //!
-//! The orbit is looked for at periods within a factor of 1.4 of the injected one, as the paper's grids did (1.2 to 2.2
-//! for 1.7); the periodogram searches all periods, and so do all routes where there is no planet, and in a part of R9.
+//! The orbit is searched at periods within a factor of 1.4 of the injected one, as the paper's grids did (1.2 to 2.2
+//! for 1.7); the periodogram searches all periods, and so do all methods where there is no planet, and in a part of R9.
 
 use crate::cases::case::search;
 use crate::cases::{Case, Estimate, Failure, Laboratory, Nodes, Outcome, Route, paper, with};
@@ -9,7 +9,7 @@ use crate::report::{Panel, Report, Series};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
-/// The orbit is looked for within this factor of the injected period.
+/// The orbit is searched within this factor of the injected period.
 const PERIOD_FACTOR: f64 = 1.4;
 
 /// Rotation period of the paper's star (d).
@@ -21,7 +21,7 @@ const ORBIT: [&str; 3] = ["k_kms", "porb_over_prot", "phi"];
 /// The orbit of most rows: K (km/s), Porb/Prot, phi.
 const PLANET: [f64; 3] = [0.1, 1.7, 0.5];
 
-/// A case with what is varied in it.
+/// A case with its varied parameters.
 struct Varied {
     values: Vec<f64>,
     case: Case,
@@ -70,23 +70,23 @@ fn tabulated(laboratory: &Laboratory, row: &str, names: &[&str], stars: Vec<Vari
     }
     sum_up(&mut report, &outcomes);
     report.figure = ORBIT.map(|name| panel(names[0], name)).to_vec();
-    // the other half of a row that is done in two ways is in the table
+    // the other half of a row done in two ways is in the table
     if let Some(way) = names.iter().find(|name| WAYS.contains(name)) {
         report.figure.iter_mut().for_each(|panel| panel.only = Some(((*way).to_owned(), 0.0)));
     }
     Ok(report)
 }
 
-/// Columns that say in which of two ways a star was modelled.
+/// Columns on which of two models of a star was used.
 const WAYS: [&str; 3] = ["equatorial_velocity_kept", "rotation_fitted", UNRESOLVED_SPOTS_FITTED];
 
-/// The way in which the chain counts what maps leave over of spots.
+/// The chain's treatment of residual (unresolved-spot) noise.
 const UNRESOLVED_SPOTS_FITTED: &str = "unresolved_spots_fitted";
 
-/// What is varied, and the change of the config that it takes.
+/// A varied parameter, and the change of the config for it.
 type Way = ((&'static str, f64), Option<(&'static str, Value)>);
 
-/// Both ways of taking what maps leave over of spots.
+/// Both treatments of residual (unresolved-spot) noise.
 fn ways_with_unresolved_spots() -> [Way; 2] {
     [
         ((UNRESOLVED_SPOTS_FITTED, 0.0), None),
@@ -126,7 +126,7 @@ fn numbers(outcome: &Outcome) -> Vec<f64> {
         for parameter in ORBIT {
             let estimate = route.and_then(|route| route.parameters.get(parameter));
             let turns = |e: &Estimate| outcome.deviation(parameter, e).map(|d| outcome.truth[parameter] + d - e.value);
-            // a phase in the turn of the truth
+            // a phase in the cycle of the truth
             let three = estimate
                 .map_or([f64::NAN; 3], |e| [e.value, e.ci68[0], e.ci68[1]].map(|x| x + turns(e).unwrap_or(0.0)));
             numbers.extend(three.map(|x| rounded(x, 6)));
@@ -149,7 +149,7 @@ fn numbers(outcome: &Outcome) -> Vec<f64> {
     numbers
 }
 
-/// `x` with so many significant digits: more would say nothing.
+/// `x` with this many significant digits: more are meaningless.
 fn rounded(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits - 1).parse().unwrap_or(x)
 }
@@ -157,8 +157,8 @@ fn rounded(x: f64, digits: usize) -> f64 {
 /// A periodogram whose highest peak is a false alarm with a larger probability has found nothing.
 const FOUND: f64 = 0.01;
 
-/// For each route: how far its estimates are from the truth, and what it took in the mean. Most rows have one map and
-/// one noise seed, so that these are no statistics of a route but of what it made of those data.
+/// For each method: deviation of its estimates from the truth, and mean cost. Most rows have one map and one noise
+/// seed, so that these are not statistics of a method but its results for those data.
 fn sum_up(report: &mut Report, outcomes: &[Outcome]) {
     for name in ROUTES {
         let routes: Vec<(&Outcome, &Route)> =
@@ -217,12 +217,12 @@ fn panel(x: &str, name: &str) -> Panel {
 
 const SEED: &str = "/observations/simulate/seed";
 
-/// Changes of a config that let the period be anything, as it may be where there is no planet.
+/// Changes of a config that leave the period free, as it may be without a planet.
 fn all_the_periods() -> [(&'static str, Value); 2] {
     [("/parameters/porb_over_prot/min", json!(0.5)), ("/parameters/porb_over_prot/max", json!(4.0))]
 }
 
-/// R4. The landscape knows nothing of unresolved spots, so that only the chain is made in both ways.
+/// R4. The likelihood grid does not model unresolved spots, so that only the chain is made in both ways.
 pub fn no_planet(laboratory: &Laboratory) -> Result<Report, Failure> {
     let mut stars = Vec::new();
     for (way, unresolved_spots) in ways_with_unresolved_spots() {
@@ -278,8 +278,8 @@ pub fn targets(laboratory: &Laboratory) -> Result<Report, Failure> {
     tabulated(laboratory, "R8", &["chi2_target", "seed"], all.map(star).collect())
 }
 
-/// R9. Once with the projected velocity as it is, as a line's width gives it, and once with the equatorial velocity
-/// kept, so that vsini goes with the inclination; the latter also with all periods allowed.
+/// R9. Once with the projected velocity fixed, as measured from a line's width, and once with the equatorial velocity
+/// fixed, so that vsini changes with the inclination; the latter also with all periods allowed.
 pub fn inclinations(laboratory: &Laboratory) -> Result<Report, Failure> {
     const TRUE_DEG: f64 = 38.0;
     const VSINI_KMS: f64 = 40.0;
@@ -325,8 +325,8 @@ pub fn shear_modelled(laboratory: &Laboratory) -> Result<Report, Failure> {
     tabulated(laboratory, "R10", &["gamma"], stars.collect())
 }
 
-/// R11. Once with the rotation of the equator, and once with the solid rotation that fits the profiles best, as an
-/// observer would take it who knows of no shear.
+/// R11. Once with the rotation of the equator, and once with the solid rotation that fits the profiles best, as assumed
+/// by an observer unaware of shear.
 pub fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Failure> {
     let mut stars = Vec::new();
     for gamma in (0..=6).map(|k| f64::from(4 * k) / 1000.0) {
@@ -365,7 +365,7 @@ pub fn co_rotation(laboratory: &Laboratory) -> Result<Report, Failure> {
             changes.extend(unresolved_spots.clone());
             let varied = [("rotations", f64::from(rotations)), ("seed", f64::from(seed)), way];
             let mut star = star(laboratory, &varied, [0.1, 1.0, 0.5], &changes);
-            // that it agrees with the chain is seen in the other rows
+            // its agreement with the chain is shown in the other rows
             star.case.grid = None;
             stars.push(star);
         }

@@ -1,5 +1,4 @@
-//! What a row comes to: a table of numbers, and the few that sum it up; as `table.csv` and `summary.json` in a folder
-//! of its name.
+//! The result of a row: a table, and summary numbers; as `table.csv` and `summary.json` in a folder of its name.
 
 use crate::cases::Failure;
 use crate::rows::Row;
@@ -12,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Name of the table.
 pub const TABLE: &str = "table.csv";
 
-/// Name of what sums it up.
+/// Name of the summary.
 pub const SUMMARY: &str = "summary.json";
 
 /// The result of a row.
@@ -20,20 +19,20 @@ pub const SUMMARY: &str = "summary.json";
 pub struct Report {
     /// Names of the columns, units at their end.
     pub columns: Vec<String>,
-    /// One number a column; NaN where there is none.
+    /// One number per column; NaN where there is none.
     pub rows: Vec<Vec<f64>>,
-    /// What sums it up.
+    /// Summary numbers.
     pub numbers: Map<String, Value>,
     /// The columns that the figure shows.
     pub figure: Vec<Panel>,
-    /// Raw results that have figures of their own.
+    /// Raw results with separate figures.
     pub drawn: Vec<Drawn>,
 }
 
-/// Raw results that are drawn.
+/// Raw results for plotting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// What the names of the figures begin with.
+    /// Prefix of the names of the figures.
     pub name: String,
     /// Their folder.
     pub folder: PathBuf,
@@ -46,11 +45,11 @@ pub struct Drawn {
 pub struct Panel {
     /// Column along the x axis.
     pub x: String,
-    /// What the y axis is, with its unit.
+    /// Label of the y axis, with its unit.
     pub label: String,
     /// The series.
     pub series: Vec<Series>,
-    /// Column of the values injected, drawn as a line.
+    /// Column of the injected values, plotted as a line.
     pub truth: Option<String>,
     /// Whether points of a series are joined.
     pub joined: bool,
@@ -69,14 +68,14 @@ pub struct Series {
     pub interval: Option<[String; 2]>,
 }
 
-/// What `summary.json` says of where a row came from.
+/// The provenance of a row in `summary.json`.
 #[derive(Debug, Serialize)]
 pub struct Made {
-    /// The command that made it.
+    /// Its command.
     pub command: String,
     /// Whether it is the reduced version.
     pub quick: bool,
-    /// Seconds that it took; less where some of it was done before.
+    /// Seconds; less where parts were already done.
     pub seconds: f64,
     /// Threads.
     pub threads: usize,
@@ -108,12 +107,12 @@ impl Report {
         self.rows.push(numbers);
     }
 
-    /// Adds a number that sums it up.
+    /// Adds a summary number.
     pub fn number(&mut self, name: &str, value: impl Into<Value>) {
         self.numbers.insert(name.to_owned(), value.into());
     }
 
-    /// Writes both files into `folder`, which must be there.
+    /// Writes both files into `folder`, which must exist.
     pub fn write(&self, row: &Row, made: &Made, folder: &Path) -> Result<(), Failure> {
         let columns: Vec<&str> = self.columns.iter().map(String::as_str).collect();
         let mut table = Table::new(&columns);
@@ -129,11 +128,11 @@ impl Report {
             figure: &self.figure,
             numbers: &self.numbers,
         };
-        // the summary last: a row is done where it is there
+        // the summary last: a row is finished where it exists
         Ok(write_json(&folder.join(SUMMARY), &summary)?)
     }
 
-    /// The numbers that sum it up, a line each.
+    /// The summary numbers, one per line.
     pub fn text(&self) -> String {
         let mut text = String::new();
         lines(&mut text, "", &self.numbers);
@@ -141,7 +140,7 @@ impl Report {
     }
 }
 
-/// To five decimals: more would say nothing.
+/// To five decimals: more are meaningless.
 pub fn rounded(x: f64) -> f64 {
     (1e5 * x).round() / 1e5
 }

@@ -9,11 +9,11 @@ use crate::{changing, coverage, images, landscape, models, orbits, stellar};
 pub struct Row {
     /// Its name on the command line and in the results: `R1` to `R12` for the paper's, a word for others.
     pub name: &'static str,
-    /// What is done.
+    /// Its description.
     pub title: &'static str,
-    /// What the paper found; empty for experiments that are not the paper's.
+    /// The paper's result; empty for experiments that are not the paper's.
     pub paper: &'static str,
-    /// Does it.
+    /// Runs it.
     pub run: fn(&Laboratory) -> Result<Report, Failure>,
 }
 

@@ -1,7 +1,7 @@
-//! R12: the paper's outlook, done: differential rotation, inclination and vsini sampled together with the orbit.
+//! R12: the paper's outlook: differential rotation, inclination and vsini sampled together with the orbit.
 //!
-//! The chain starts three standard deviations off in each of them. A landscape over the orbit alone, all else at its
-//! injected value, says how many nodes a grid over all of them would take.
+//! The chain starts three standard deviations off in each of them. A likelihood grid over the orbit only, with all
+//! other parameters at their injected values, shows how many nodes a grid over all of them would need.
 
 use crate::cases::{ENDS, Estimate, Failure, Laboratory, Nodes, case, paper, with};
 use crate::report::{Drawn, Report};
@@ -10,7 +10,7 @@ use dimcmc::internals::runs::comparison::{Comparison, Pair};
 use dimcmc::internals::sampling::landscape::Rule;
 use serde_json::{Value, json};
 
-/// A parameter of the star: where the config has it, its injected value, how far off the start is, prior.
+/// A parameter of the star: path in the config, injected value, offset of the start, prior.
 struct Stellar {
     parameter: Parameter,
     key: &'static str,
@@ -61,7 +61,7 @@ const STELLAR: [Stellar; 4] = [
     },
 ];
 
-/// First columns of the table: what the chain took, and what a grid as fine over all parameters would take.
+/// First columns of the table: the cost of the chain, and that of an equally fine grid over all parameters.
 const COSTS: [&str; 3] = ["dimensions", "chain_reconstructions", "nodes_of_a_grid"];
 
 /// R12.

@@ -1,4 +1,4 @@
-//! What must come out whatever the paper says, each test named after the mistake that it would catch; and the program
+//! Results that must hold whatever the paper's, each test named after the mistake that it would catch; and the program
 //! on a row.
 
 use super::{Args, list, rows, run};
@@ -18,11 +18,11 @@ const ROTATION_PERIOD_D: f64 = 3.0;
 /// Injected orbit: no two numbers alike, phi far from its mirror image and from half a turn.
 const ORBIT: [(&str, f64); 3] = [("k_kms", 0.12), ("porb_over_prot", 1.6), ("phi", 0.2)];
 
-/// Landscape and periodogram of the paper's star with that orbit, on few pixels.
+/// Likelihood grid and periodogram of the paper's star with that orbit, on few pixels.
 ///
-/// The program simulates the star alone, and each profile is shifted by the formula of the method as it is written
-/// here, through the velocity that the list of profiles takes off: so a mistake in the program's own orbit cannot
-/// cancel itself.
+/// The program simulates only the star, and each profile is shifted by the formula of the method, written here
+/// independently, through the velocity that the list of profiles subtracts: so a mistake in the program's own orbit
+/// cannot cancel itself.
 fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
     let lone = [("/planet", json!({ "k_kms": 0.0, "porb_over_prot": 1.0, "phi": 0.0 }))];
@@ -57,7 +57,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
     outcome
 }
 
-/// The outcome on the paper's star as it is, which tests share.
+/// The outcome on the unmodified star of the paper, shared by tests.
 fn plain() -> &'static Outcome {
     static MADE: OnceLock<Outcome> = OnceLock::new();
     MADE.get_or_init(|| outcome(&[]))
@@ -92,8 +92,7 @@ fn k_has_the_right_sign_and_phi_the_right_zero_point() {
     assert!(phi.error() < 0.05, "too uncertain for the test: {}", phi.error());
 }
 
-/// A phase that were counted from the first profile, or in rotations, would come out elsewhere: here a quarter of a
-/// turn or a fifth.
+/// A phase counted from the first profile, or in rotations, would differ: here a quarter of a turn or a fifth.
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn phi_is_counted_in_orbital_cycles_from_the_epoch() {
@@ -103,8 +102,8 @@ fn phi_is_counted_in_orbital_cycles_from_the_epoch() {
     assert_recovered(&outcome, "porb_over_prot");
 }
 
-/// The landscape's nodes are laid out as the table says: the best node is the injected orbit, not one with axes
-/// exchanged.
+/// The nodes of the likelihood grid are in the order of the table: the best node is the injected orbit, not one with
+/// axes exchanged.
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn axes_are_not_swapped() {
@@ -121,9 +120,9 @@ fn axes_are_not_swapped() {
     assert_eq!(place, [0.1, 1.7, 0.5]);
 }
 
-/// The error bar of K is what an independent implementation found from the full curvature, 10.6 m/s (to 10 %: another
+/// The error bar of K is that of an independent implementation from the full curvature, 10.6 m/s (to 10 %: another
 /// orbit, other noise), and twice that at half the signal-to-noise ratio (to 15 %: fewer spots are seen in more noise).
-/// A chi2 that were scaled, or counted twice, would show in both.
+/// A chi2 scaled or counted twice would change both.
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn chi2_has_its_scale() {

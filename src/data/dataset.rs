@@ -1,6 +1,6 @@
-//! The observations of a config as they are in their files, or as they are simulated: profiles in their whole width
-//! and light curves, errors as quoted. A command reads or simulates them once, and nobody changes them:
-//! [`calibrated`](super::calibrated) makes of them what enters the model.
+//! The observations of a config as read from files or simulated: profiles over their full width and light curves, with
+//! quoted uncertainties. A command reads or simulates them once, and they stay constant:
+//! [`calibrated`](super::calibrated) derives the input of the model.
 
 use crate::data::config::{
     ConfigError, DataSetSettings, IndicatorSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
@@ -28,11 +28,11 @@ pub struct Dataset {
     pub light_curves: Vec<Measurements>,
     /// The activity indicators, their values in place of fluxes.
     pub indicators: Vec<Measurements>,
-    /// The files that they come from.
+    /// Their files.
     pub files: Vec<PathBuf>,
 }
 
-/// Why there are no observations, or none that make sense: one line that names file, and line or key.
+/// Why there are no valid observations: one line that names file, and line or key.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The config is at fault.
@@ -50,14 +50,14 @@ impl Dataset {
     /// Reads or simulates the observations of `settings`.
     ///
     /// # Errors
-    /// Files that cannot be read or make no sense, and days of several zero points.
+    /// Files that cannot be read or are invalid, and days in several time systems.
     pub fn read(settings: &Settings) -> Result<Self, SceneError> {
         let light_curves = light_curves(settings)?;
         let sets = settings.sets.iter().map(|set| profiles(settings, set)).collect::<Result<Vec<_>, _>>()?;
         Dataset::of(settings, sets, light_curves)
     }
 
-    /// The same with profiles at hand in place of those of each data set.
+    /// The same with these profiles in place of those of each data set.
     ///
     /// # Errors
     /// As [`Dataset::read`], another number of data sets, and ones that are simulated.
@@ -104,7 +104,7 @@ impl Dataset {
     }
 }
 
-/// Profiles that are in no file, with names for them.
+/// Profiles from memory, with names for them.
 pub fn in_memory(observations: Observations, name: impl Fn(usize) -> String) -> ProfileSet {
     let label = |k: usize| Label { file: name(k), path: None, vrad_kms: 0.0, line: 0 };
     let labels = (0..observations.profiles.len()).map(label).collect();
@@ -154,7 +154,7 @@ fn without_excluded(
     Ok(all)
 }
 
-/// That no profile is exposed for longer than is modelled.
+/// Checks that no profile is exposed for longer than is modelled.
 fn check_exposures(settings: &Settings, set: &DataSetSettings, profiles: &ProfileSet) -> Result<(), SceneError> {
     for (profile, label) in profiles.observations.profiles.iter().zip(&profiles.labels) {
         let Some(problem) = profile.exposure_s.and_then(|seconds| too_long(seconds, &set.star)) else { continue };
@@ -169,7 +169,7 @@ fn check_exposures(settings: &Settings, set: &DataSetSettings, profiles: &Profil
     Ok(())
 }
 
-/// That the star was observed more than once, whatever the data sets are.
+/// Checks that the star was observed more than once, over all data sets.
 fn enough(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
     let count: usize = sets.iter().map(|set| set.labels.len()).sum();
     let is_observed = settings.sets.iter().any(|set| matches!(set.source, ObservationSource::Files { .. }));
@@ -179,7 +179,7 @@ fn enough(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
     }
 }
 
-/// That no profile is in two data sets: its noise would be taken for a signal seen twice.
+/// Checks that no profile is in two data sets: its noise would look like a repeated signal.
 fn no_profile_twice(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
     let mut seen: HashMap<Vec<u64>, (usize, &Label)> = HashMap::new();
     for (s, set) in sets.iter().enumerate() {
@@ -201,7 +201,7 @@ fn no_profile_twice(settings: &Settings, sets: &[ProfileSet]) -> Result<(), Conf
     Ok(())
 }
 
-/// That no two light curves are the same measurements, for the most part.
+/// Checks that no two light curves are mostly the same measurements.
 fn no_light_curve_twice(settings: &Settings, curves: &[Measurements]) -> Result<(), ConfigError> {
     let numbers = |curve: &Measurements| {
         curve.fluxes.iter().map(|one| [one.time_d, one.flux].map(f64::to_bits)).collect::<HashSet<_>>()
@@ -219,7 +219,7 @@ fn no_light_curve_twice(settings: &Settings, curves: &[Measurements]) -> Result<
     Ok(())
 }
 
-/// That days of all data sets are of one count.
+/// Checks that all data sets use one time system.
 fn one_day_count(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
     let firsts = || sets.iter().filter_map(|set| set.observations.times_d().into_iter().reduce(f64::min));
     let Some(first) = firsts().next() else { return Ok(()) };
@@ -237,10 +237,10 @@ fn one_day_count(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigE
     }
 }
 
-/// Times (d) of a light curve from a first to a last time, one each `cadence_d`; `key` is the section that has it.
+/// Times (d) of a light curve from a first to a last time, one each `cadence_d`; `key` is its section.
 ///
 /// # Errors
-/// More than can be.
+/// Too many measurements.
 pub fn at_cadence(
     settings: &Settings,
     key: &str,

@@ -1,10 +1,10 @@
-//! Why no map fits: one thing at a time is changed, and what helps most is the likely reason.
+//! Why no map fits: one property at a time is changed, and the most effective change is the likely reason.
 //!
-//! Tried are vsini, width, wings and strength of the local line, the continuum, the velocity range, the rotation period
-//! and faculae, each on coarse maps at the errors with which the config's own map fits. Of what helps most the best
-//! value is looked for, and the smallest chi2 that a map then comes down to. Where nothing helps the errors are left:
-//! they are too small, or the profiles hold something that the model of the star does not know. Two things wrong at
-//! once show as the one that helps more. Profiles with the lines of two stars, and variances given for standard
+//! Tested are vsini, width, wings and strength of the local line, the continuum, the velocity range, the rotation
+//! period and faculae, each on coarse maps with the uncertainties at which the config's own map fits. For the most
+//! effective change the best value is sought, and the smallest chi2 that a map then reaches. If nothing helps, the
+//! uncertainties are too small, or the profiles contain a signal outside the model of the star. Of two simultaneous
+//! faults the more effective change is reported. Profiles with the lines of two stars, and variances given as standard
 //! deviations, are recognised without maps.
 
 mod change;
@@ -23,15 +23,15 @@ use std::sync::Arc;
 /// Pixels of the maps: enough to see whether a change helps.
 const PIXELS: usize = 500;
 
-/// A change is a reason when chi2 falls to less than this share of what it was, and what it has above its target
+/// A change is a reason when chi2 falls to less than this fraction of its former value, and its excess over the target
 /// likewise.
 const HELPS: f64 = 0.8;
 const HELPS_EXCESS: f64 = 0.6;
 
-/// Rounds of looking for a better value between those tried.
+/// Rounds of refinement between the tried values.
 const REFINEMENTS: usize = 2;
 
-/// What is likely to keep a map from fitting.
+/// The likely reason why a map does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
@@ -49,7 +49,7 @@ pub enum Reason {
     VelocityRange,
     /// Rotation period.
     RotationPeriod,
-    /// What the map holds: bright pixels beside dark ones.
+    /// Content of the map: bright as well as dark pixels.
     Brightness,
     /// Lines of two stars.
     DoubleLines,
@@ -64,16 +64,16 @@ pub enum Reason {
 pub struct Diagnosis {
     /// The likely reason.
     pub reason: Reason,
-    /// It in words, with what helps.
+    /// The reason and the remedy in words.
     pub text: String,
-    /// chi2 per independent datum that a map comes down to as it is, with errors as the continuum has them, or as
-    /// given; absent where no map was made.
+    /// chi2 per independent datum of a map without a change, with uncertainties from the continuum, or as given; absent
+    /// where no map was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chi2_per_datum: Option<f64>,
     /// The same with the change that helps most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chi2_per_datum_changed: Option<f64>,
-    /// Everything that was tried, with chi2 relative to that without a change.
+    /// All tested changes, with chi2 relative to that without a change.
     pub tried: Vec<Tried>,
 }
 
@@ -87,8 +87,8 @@ pub struct Tried {
 }
 
 impl Diagnosis {
-    /// Of a scene that no map fits as well as its errors promise: at sight, or by trying. `None` where there is no map
-    /// at all. Of several data sets nothing is tried.
+    /// The diagnosis of a scene that no map fits within its uncertainties: by inspection, or by tests. `None` where
+    /// there is no map at all. With several data sets nothing is tested.
     pub fn of(scene: &Scene) -> Option<Self> {
         if let Some(seen) = Self::at_sight(scene) {
             return Some(seen);
@@ -143,7 +143,7 @@ impl Diagnosis {
         })
     }
 
-    /// What takes no map to see, in any of the data sets.
+    /// Faults that are visible without a map, in any of the data sets.
     pub fn at_sight(scene: &Scene) -> Option<Self> {
         let parts = of_sets(&scene.imager, &scene.whole_over_continuum());
         let several = parts.len() > 1;
@@ -158,7 +158,7 @@ impl Diagnosis {
     }
 }
 
-/// What is examined: coarse maps of the scene, with errors as the continuum has them where that was measured.
+/// The subject: coarse maps of the scene, with uncertainties from the continuum where that was measured.
 fn patient(scene: &Scene) -> Patient {
     let mut settings = scene.settings.clone();
     settings.imaging.pixels = settings.imaging.pixels.min(PIXELS);
@@ -183,7 +183,7 @@ fn scale_errors(observations: &mut Observations, factor: f64) {
     observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
 }
 
-/// Factor on the errors with which a map fits; `start` is a guess.
+/// Factor on the uncertainties at which a map fits; `start` is a guess.
 fn factor(patient: &Patient, start: f64) -> Option<f64> {
     let imager = |factor: f64| {
         let mut observations = patient.observations.clone();
@@ -193,13 +193,13 @@ fn factor(patient: &Patient, start: f64) -> Option<f64> {
     factor_to_fit(patient.settings.values, patient.correlated_bins, imager).ok()?.ok().map(|found| start * found)
 }
 
-/// Whether a map that fits with errors times `changed`, instead of `unchanged`, fits so much better.
+/// Whether a map that fits with uncertainties times `changed`, instead of `unchanged`, is significantly better.
 fn helps(unchanged: f64, changed: f64) -> bool {
     let excess = |factor: f64| (factor * factor - 1.0).max(0.0);
     changed.powi(2) < HELPS * unchanged.powi(2) && excess(changed) < HELPS_EXCESS * excess(unchanged)
 }
 
-/// chi2 with a change over that without, both with the errors with which a map fits without it.
+/// chi2 with a change over that without, both with the uncertainties at which a map fits without it.
 fn relative_chi2(patient: &Patient, change: &Change, unchanged: f64) -> Option<f64> {
     let mut changed = change.applied(patient)?;
     scale_errors(&mut changed.observations, unchanged);

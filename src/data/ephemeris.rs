@@ -1,4 +1,4 @@
-//! Whether a known ephemeris tells the phase at the time of the data.
+//! Whether a known ephemeris predicts the phase at the time of the data.
 
 use crate::data::config::{ConfigError, Settings};
 use crate::model::{Clock, Elements, Ephemeris};
@@ -13,7 +13,7 @@ pub fn ephemerides(settings: &Settings) -> Vec<Ephemeris> {
     Ephemeris::all(&settings.free, &settings.values, clock)
 }
 
-/// Refuses an ephemeris that does not tell the phase at the time of the data.
+/// Refuses an ephemeris that does not predict the phase at the time of the data.
 ///
 /// # Errors
 /// A config that names the conjunction.

@@ -1,8 +1,9 @@
 //! From another program's input files to a proposal: ZDIpy's star, line and list of profiles in this program's terms,
-//! and a list of what has no counterpart here.
+//! and a list of settings without a counterpart.
 //!
 //! Angles, signs, epoch, units and the Voigt profile of the local line are the same in both (`io::zdipy`). A target
-//! chi2 far from 1 says that the errors are wrong: they are measured here, with what noise neighbouring bins share.
+//! chi2 far from 1 indicates wrong uncertainties: they are measured here, including the noise correlation of
+//! neighbouring bins.
 
 use crate::data::config::EquivalentWidth;
 use crate::data::init::{Given, Known};
@@ -13,21 +14,21 @@ use crate::surface::ObjectiveKind;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A target chi2 within this range is taken as it is.
+/// A target chi2 within this range is kept.
 const FAIR_TARGET: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
-/// What an input file makes.
+/// The result of importing an input file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Import {
-    /// What is known of the star.
+    /// Known properties of the star.
     pub known: Known,
     /// The list of profiles, as text.
     pub list: String,
-    /// What is not taken over: where it stands, what it is, and why.
+    /// Settings that are not imported: where, what, and why.
     pub left_out: Vec<[String; 3]>,
 }
 
-/// Why there is none.
+/// Why the import fails.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "{place}: profile {file}: the list of profiles cannot hold a path with a blank or a # in it: write the config \
@@ -39,8 +40,8 @@ pub struct ImportError {
 }
 
 impl Import {
-    /// Of ZDIpy's `inzdi.dat` and, if there is one, its model of the local line. `folder` is that of the input as seen
-    /// from the list of profiles.
+    /// Imports ZDIpy's `inzdi.dat` and, if there is one, its model of the local line. `folder` is that of the input as
+    /// seen from the list of profiles.
     ///
     /// # Errors
     /// A path that the list cannot hold.
@@ -53,7 +54,7 @@ impl Import {
         Ok(Import { known: known(input, line), list: list(input, folder)?, left_out })
     }
 
-    /// What is not taken over, aligned; empty if there is nothing.
+    /// Settings that are not imported, aligned; empty if there are none.
     pub fn table(&self) -> String {
         if self.left_out.is_empty() {
             return String::new();
@@ -112,13 +113,13 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
     known
 }
 
-/// As many pixels as ZDIpy has in so many rings: `4 / pi` times their square, about.
+/// The number of pixels of ZDIpy with this many rings: `4 / pi` times their square, about.
 fn pixels(rings: usize) -> usize {
     const FEWEST: usize = 100;
     ((4.0 / std::f64::consts::PI * (rings * rings) as f64).round() as usize).max(FEWEST)
 }
 
-/// A target chi2 near 1 for the brightness map; another one says that errors are wrong, which are measured here.
+/// A target chi2 near 1 for the brightness map; another one indicates wrong uncertainties, which are measured here.
 fn chi2_target(input: &Input) -> Option<Given<f64>> {
     match input.target.value {
         Target::Chi2(target) if input.brightness.value && FAIR_TARGET.contains(&target) => {
@@ -128,7 +129,7 @@ fn chi2_target(input: &Input) -> Option<Given<f64>> {
     }
 }
 
-/// Factor on the errors that the file's target and scaling of chi2 stand for; 1 where they say nothing.
+/// Factor on the uncertainties implied by the file's target and scaling of chi2; 1 without them.
 fn own_scale(input: &Input) -> f64 {
     let scale = 1.0 / input.chi2_scale.sqrt();
     match input.target.value {

@@ -1,12 +1,11 @@
-//! What comes from files, and a first config.
+//! Data from files, and a first config.
 //!
-//! The way of a profile: [`config`] names its file and says how it is used; [`io`] reads the file once; [`dataset`]
-//! holds the profile as in the file; [`calibrated`] makes of it what enters the model; [`scene`] joins all of these in
-//! what a surface model takes, an `Imager`.
-//! Neither the settings nor the data set change afterwards.
+//! The path of a profile: [`config`] names its file and its use; [`io`] reads the file once; [`dataset`] holds the
+//! profile as in the file; [`calibrated`] prepares it for the model; [`scene`] joins all of these in the input of a
+//! surface model, an `Imager`. Neither the settings nor the data set change afterwards.
 //!
 //! [`simulate`] makes profiles in place of files. [`init`] and [`import`] write a first config, [`diagnosis`] finds out
-//! why a model does not fit. [`io`] also has the formats of results, a file each.
+//! why a model does not fit. [`io`] also has the formats of results, one file each.
 
 pub mod calibrated;
 pub mod config;

@@ -1,5 +1,4 @@
-//! What every command begins with: a config, its observations as they are and as they enter the model, and what they
-//! are imaged with.
+//! The start of every command: a config, its observations as read and as prepared for the model, and their imager.
 
 mod truth;
 
@@ -28,7 +27,7 @@ use std::sync::Arc;
 
 pub use crate::data::dataset::SceneError;
 
-/// What stands for the list of profiles in the config of profiles that are in no file.
+/// Placeholder of the list in the config of profiles from memory.
 const IN_MEMORY: &str = "profiles in memory";
 
 /// A config with its observations.
@@ -37,7 +36,7 @@ pub struct Scene {
     /// The config, resolved.
     #[doc(hidden)]
     pub settings: Settings,
-    /// The observations as they are in their files, or as simulated.
+    /// The observations as in their files, or as simulated.
     #[doc(hidden)]
     pub data: Arc<Dataset>,
     /// The line profiles as they enter the model; of several data sets one after the other.
@@ -48,13 +47,13 @@ pub struct Scene {
     /// The parameters that were simulated; `None` for observations from files.
     #[doc(hidden)]
     pub truth: Option<ParameterValues>,
-    /// What the config leaves to the observations: errors, velocity jitter, target chi2.
+    /// Quantities that the config leaves to the observations: uncertainties, RV jitter, target chi2.
     #[doc(hidden)]
     pub measured: Measured,
     /// Target chi2 per datum, of the config or measured.
     #[doc(hidden)]
     pub chi2_target: f64,
-    /// What the observations are imaged with.
+    /// The imager of the observations.
     #[doc(hidden)]
     pub imager: Imager,
     /// The values of each activity indicator, in the order of time.
@@ -69,7 +68,7 @@ impl Scene {
     /// Reads the config at `path` and reads or simulates its observations.
     ///
     /// # Errors
-    /// A config or observations that cannot be read or make no sense.
+    /// A config or observations that cannot be read or are invalid.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         Scene::new(&Config::load(path)?)
     }
@@ -77,18 +76,18 @@ impl Scene {
     /// Reads or simulates the observations of `config`.
     ///
     /// # Errors
-    /// A config or observations that make no sense.
+    /// A config or observations that are invalid.
     pub fn new(config: &Config) -> Result<Self, SceneError> {
         let settings = config.settings()?;
         let data = Arc::new(Dataset::read(&settings)?);
         Scene::of(settings, data)
     }
 
-    /// The scene of `config` with these profiles in place of its own: cut, scaled and judged as profiles from files
-    /// would be.
+    /// The scene of `config` with these profiles instead of those in its files: cut, scaled and checked like profiles
+    /// from files.
     ///
     /// # Errors
-    /// A config or profiles that make no sense.
+    /// A config or profiles that are invalid.
     pub fn with_profiles(config: &Config, profiles: Observations) -> Result<Self, SceneError> {
         let config = match config.get("observations.path") {
             Some(_) => config.clone(),
@@ -100,10 +99,10 @@ impl Scene {
         Scene::of(settings, data)
     }
 
-    /// The scene of a config whose observations are at hand.
+    /// The scene of a config whose observations are already read.
     ///
     /// # Errors
-    /// Settings that make no sense with these observations.
+    /// Settings that are invalid for these observations.
     #[doc(hidden)]
     pub fn of(settings: Settings, data: Arc<Dataset>) -> Result<Self, SceneError> {
         let calibrated = Calibrated::of(&settings, &data)?;
@@ -118,14 +117,14 @@ impl Scene {
         Scene { settings, data, observations, data_sha256, truth, measured, chi2_target, imager, indicators, space }
     }
 
-    /// The same with numbers of the star that the config leaves to the profiles; `report` is told what is under way.
-    /// Where there is no fit they stay as they are, and results say why.
+    /// The same with the parameters of the star that the config leaves to the profiles; `report` receives the progress.
+    /// Where there is no fit they keep their values, and results give the reason.
     #[must_use]
     pub fn fitted(self, report: &dyn Fn(&str)) -> Self {
         self.with_fitted_indicators(report).with_fitted_star(report)
     }
 
-    /// The same with indicators by the gains that profiles and values have them have.
+    /// The same with indicators, their gains fitted to profiles and values.
     fn with_fitted_indicators(mut self, report: &dyn Fn(&str)) -> Self {
         if self.indicators.is_empty() || !self.measured.indicators.is_empty() {
             return self;
@@ -142,7 +141,7 @@ impl Scene {
         }
     }
 
-    /// The same with indicators as they were fitted.
+    /// The same with the fitted indicators.
     fn with_indicators(mut self, found: &[FittedIndicator]) -> Self {
         let used = found.iter().zip(&self.indicators).enumerate().filter(|(_, (found, _))| found.is_used());
         let of = |(number, (found, values)): (usize, (&FittedIndicator, &Vec<Flux>))| {
@@ -153,7 +152,7 @@ impl Scene {
         self
     }
 
-    /// The same with what is fitted of star and events.
+    /// The same with star and events fitted.
     fn with_fitted_star(mut self, report: &dyn Fn(&str)) -> Self {
         let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
         let contrasts = self.fitted_contrasts();
@@ -198,7 +197,7 @@ impl Scene {
         self.settings.sets.iter().enumerate().filter_map(fits).collect()
     }
 
-    /// The same with contrasts of spots of these data sets as they were fitted.
+    /// The same with the fitted contrasts of spots of these data sets.
     fn with_contrasts(mut self, sets: &[MeasuredSet]) -> Self {
         for (set, found) in sets.iter().enumerate() {
             if let Some(contrast) = found.contrast {
@@ -209,7 +208,7 @@ impl Scene {
         self
     }
 
-    /// What is known of events among the profiles; `None` where they are not looked for.
+    /// The prior of events among the profiles; `None` where events are not sought.
     fn by_hand(&self) -> Option<Vec<ByHand>> {
         let sets = self.settings.sets.iter().zip(self.imager.profiles_of_sets());
         let of_set = |(set, profiles): (&DataSetSettings, Range<usize>)| {
@@ -224,7 +223,7 @@ impl Scene {
         self.settings.sets.iter().any(|set| set.events.is_some()).then(|| sets.flat_map(of_set).collect())
     }
 
-    /// The same with what was found of star and events.
+    /// The same with the fitted star and events.
     #[must_use]
     #[doc(hidden)]
     pub fn with_found(self, found: &Measured) -> Self {
@@ -251,7 +250,7 @@ impl Scene {
         }
     }
 
-    /// Slopes (km/s/d) of the drifts by those of `before`, of which a data set of a single profile has none.
+    /// Slopes (km/s/d) of the drifts from those of `before`; a data set of a single profile has none.
     fn slopes_of(&self, before: &Imager, kms_d: &[f64]) -> Vec<f64> {
         if kms_d.is_empty() {
             return Vec::new();
@@ -265,7 +264,7 @@ impl Scene {
         with_drifts(&self.imager).into_iter().map(|drift| of(drift.set)).collect()
     }
 
-    /// The same with drifts held at slopes that were found.
+    /// The same with drifts fixed at the fitted slopes.
     fn with_drift(mut self, kms_d: &[f64]) -> Self {
         if !kms_d.is_empty() {
             if self.imager.drifts.is_empty() {
@@ -277,7 +276,7 @@ impl Scene {
         self
     }
 
-    /// The same with larger errors of profiles that are events.
+    /// The same with larger uncertainties of profiles that are events.
     fn with_events(mut self, events: Events) -> Self {
         let factors = events.factors(self.observations.profiles.len());
         for (profile, factor) in self.observations.profiles.iter_mut().zip(&factors) {
@@ -288,7 +287,7 @@ impl Scene {
         self
     }
 
-    /// The same with numbers of the star as they were measured.
+    /// The same with the measured parameters of the star.
     fn with_star(mut self, star: MeasuredStar) -> Self {
         star.put_into(&mut self.imager);
         let in_values = |parameter: Parameter| {
@@ -300,11 +299,11 @@ impl Scene {
         self
     }
 
-    /// The same star with `orbits` put into its profiles: into whole ones, resampled and cut again. Errors stay, and so
-    /// does all that was measured.
+    /// The same star with `orbits` injected into its profiles over their full width, which are resampled and cut again.
+    /// Uncertainties and all measured quantities are kept.
     ///
     /// # Errors
-    /// Profiles that no longer make sense.
+    /// Profiles that become invalid.
     #[doc(hidden)]
     pub fn injected(&self, orbits: &[Orbit]) -> Result<Self, ConfigError> {
         let mut observations = self.observations.clone();
@@ -318,10 +317,10 @@ impl Scene {
         self.with_parts(of_sets(&self.imager, &observations))
     }
 
-    /// The same star with these profiles of each data set: all that was measured stays.
+    /// The same star with these profiles of each data set: all measured quantities are kept.
     ///
     /// # Errors
-    /// Profiles that make no sense.
+    /// Profiles that are invalid.
     #[doc(hidden)]
     pub fn with_parts(&self, parts: Vec<Observations>) -> Result<Self, ConfigError> {
         let Scene { settings, data, observations, measured, chi2_target, imager, .. } = self;
@@ -339,20 +338,20 @@ impl Scene {
         })
     }
 
-    /// The config file, or what stands for it: what errors name.
+    /// The config file, or its placeholder, for errors.
     pub fn path(&self) -> &Path {
         &self.settings.path
     }
 
-    /// That the config leaves a parameter free, as searches and chains need.
+    /// Checks that the config has a free parameter, as searches and chains need.
     ///
     /// # Errors
-    /// A config that does not.
+    /// A config without one.
     pub fn require_free(&self) -> Result<(), ConfigError> {
         self.settings.require_free().map(drop)
     }
 
-    /// What is assumed of the spots.
+    /// The prior of the spots.
     #[doc(hidden)]
     pub fn surface(&self) -> SurfaceSettings {
         let objective = self.settings.imaging.objective;
@@ -360,18 +359,18 @@ impl Scene {
         SurfaceSettings { objective, chi2_target: self.chi2_target, field: Some(field) }
     }
 
-    /// The search for the best parameters that the config asks for.
+    /// The search for the best parameters that the config specifies.
     #[doc(hidden)]
     pub fn search_settings(&self) -> SearchSettings {
         let other_rotation = self.measured.other_rotation;
         SearchSettings { other_rotation, ..SearchSettings::of(self.surface(), self.settings.sampler.seed) }
     }
 
-    /// The maps of the star at the config's values, and whether they fit: one, one a season, or, where maps evolve, one
-    /// at each of `times_d`, by default of each night.
+    /// The maps of the star at the config's values, and whether they fit: one per season, or, where maps evolve, one at
+    /// each of `times_d`, by default each night.
     ///
     /// # Errors
-    /// [`NoMaps`]: a target chi2 that no map reaches, a field that cannot be fitted, times that make no sense.
+    /// [`NoMaps`]: a target chi2 that no map reaches, a field that cannot be fitted, invalid times.
     pub fn maps(&self, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps> {
         let nuisances = nuisances(&self.settings.free);
         let at = At { imager: &self.imager, values: self.settings.values, nuisances: &nuisances };
@@ -383,12 +382,12 @@ impl Scene {
     /// The best parameters, and the posterior with its reference there.
     ///
     /// # Errors
-    /// No map, or no start that leads anywhere.
+    /// No map, or no start with a finite log-probability.
     pub fn optimise(&self) -> Result<Found, SearchError> {
         self.optimise_with(&|_| ())
     }
 
-    /// The same; `report` is told at every evaluation how far the search has come, from any thread.
+    /// The same; `report` receives the progress at every evaluation, from any thread.
     ///
     /// # Errors
     /// As [`Scene::optimise`].
@@ -409,7 +408,7 @@ impl Scene {
         search::find(&self.imager, &self.space_of(free), self.search_settings(), report)
     }
 
-    /// The profiles in their whole width, as they are in their files: what is injected into.
+    /// The profiles over their full width, as in their files, for injections.
     #[doc(hidden)]
     pub fn whole(&self) -> Observations {
         Observations::joined(self.data.sets.iter().map(|set| set.observations.clone()).collect())
@@ -421,7 +420,7 @@ impl Scene {
         self.over_continua(self.whole())
     }
 
-    /// Whole profiles of all data sets in units of their continua.
+    /// Profiles of all data sets over their full width in units of their continua.
     fn over_continua(&self, whole: Observations) -> Observations {
         let parts = of_sets(&self.imager, &whole).into_iter().zip(&self.settings.sets);
         Observations::joined(parts.map(|(part, set)| part.over_continuum(set.continuum_level())).collect())
@@ -446,7 +445,7 @@ impl Scene {
         EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, jitters)
     }
 
-    /// What results say of where they came from.
+    /// The provenance of results.
     #[doc(hidden)]
     pub fn provenance(&self) -> Provenance {
         Provenance {

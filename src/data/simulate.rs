@@ -3,11 +3,11 @@
 //!
 //! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of
 //! filling factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the
-//! largest s and the largest excess e of the discs that overlap. Where spots come and go each profile has a map of its
-//! own. The same simulation gives the same numbers on every machine and with any number of threads.
+//! largest s and the largest excess e of the discs that overlap. With evolving spots each profile has its own map. The
+//! same simulation gives the same numbers on every machine and with any number of threads.
 //!
-//! [`Schedule`] draws times of observation, from a [`Site`] those at night, [`RandomSpots`] spots; `maps` puts them on
-//! a grid.
+//! [`Schedule`] draws times of observation, restricted to nights at a [`Site`], [`RandomSpots`] spots; `maps` puts them
+//! on a grid.
 
 mod maps;
 mod random_spots;
@@ -30,17 +30,17 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-/// Standard error that observations without noise are given: that of a signal-to-noise ratio of 1000.
+/// Standard error of observations without noise: that of a signal-to-noise ratio of 1000.
 pub const SIGMA_WITHOUT_NOISE: f64 = 1e-3;
 
 /// Observations to be simulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
-    /// The spots (radians), those that come and go among them.
+    /// The spots (radians), including evolving ones.
     pub spots: Vec<Spot>,
     /// The faculae (radians).
     pub faculae: Vec<Facula>,
-    /// All parameters as simulated: those of the config, but for `truth`.
+    /// All parameters as simulated: those of the config, except for `truth`.
     pub truth: ParameterValues,
     /// Times of the profiles (d).
     pub times_d: Vec<f64>,
@@ -56,26 +56,26 @@ pub struct Simulation {
     pub seed: u64,
     /// Pixels of the star.
     pub pixels: usize,
-    /// Standard deviations of what is wrong with each profile by itself, in line and continuum.
+    /// Standard deviations of errors of line and continuum of each profile.
     pub continuum: LineAndContinuum,
-    /// Standard deviation of the velocity zero points of the profiles (km/s).
+    /// RV jitter of the profiles (km/s).
     pub velocity_jitter_kms: f64,
     /// Velocity that is added to all profiles (km/s).
     pub zero_point_kms: f64,
-    /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
+    /// Correlation length of the noise in bins: the sum of its correlations with all bins of a long profile, 1 for
     /// white noise.
     pub correlated_bins: f64,
     /// Exposure time of all profiles (s); instants if `None`.
     pub exposure_s: Option<f64>,
 }
 
-/// How often a star that is simulated is looked at in an exposure, over how often the model looks.
+/// Samples per exposure of a simulated star, relative to those of the model.
 const FINER_LOOKS: usize = 3;
 
 /// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
 const CONTINUUM_STREAM: u64 = 1;
 
-/// Stream of the random numbers of the velocity zero points.
+/// Stream of the random numbers of the RV jitter.
 const ZERO_POINT_STREAM: u64 = 2;
 
 /// Stream of the random numbers of light curves.
@@ -92,7 +92,7 @@ impl Simulation {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
         let state = self.truth.state();
         let zero_points = self.zero_points_kms();
-        // a line that is farther to the red by its zero point is the line seen from bins that are farther to the blue
+        // a line shifted to the red by its RV offset equals the line evaluated on bins shifted to the blue
         let own = self.first_velocity_kms - self.zero_point_kms;
         let first = |k: usize| zero_points.get(k).map_or(own, |v| own - v);
         let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
@@ -130,7 +130,7 @@ impl Simulation {
         Observations { profiles }
     }
 
-    /// The flux of `star` in a band at `times_d`, over that of its bare photosphere, with errors of a standard
+    /// The flux of `star` in a band at `times_d`, over that of its bare photosphere, with noise of this standard
     /// deviation and seed.
     pub fn fluxes(&self, star: &StarSettings, band: &Band, times_d: &[f64], (sigma, seed): (f64, u64)) -> Vec<Flux> {
         /// Maps that are held at a time.
@@ -146,7 +146,7 @@ impl Simulation {
                 let map = changing.as_ref().map_or(still.column(0), |maps| maps.column(k));
                 let shares = band.shares(&grid, star, &state, &[*time_d]);
                 let flux = shares.iter().zip(&map).map(|(share, brightness)| share * brightness).sum::<f64>();
-                // spots that are darker at the limb: what shares add up to is not 1
+                // spots that are darker at the limb: weights do not sum to 1
                 if star.regions.are_plain() { flux } else { flux + 1.0 - shares.iter().sum::<f64>() }
             };
             fluxes.par_extend(times_d.par_iter().enumerate().map(flux));
@@ -158,7 +158,7 @@ impl Simulation {
         times_d.iter().zip(fluxes).map(measured).collect()
     }
 
-    /// What is wrong with each profile by itself; empty if nothing is.
+    /// Errors of line and continuum of each profile; empty if there are none.
     pub fn nuisances(&self) -> Vec<LineAndContinuum> {
         if self.continuum == LineAndContinuum::default() {
             return Vec::new();
@@ -174,7 +174,7 @@ impl Simulation {
         self.times_d.iter().map(|_| draw()).collect()
     }
 
-    /// The velocity zero point of each profile (km/s), which is added to its own velocity; empty if there is none.
+    /// The RV jitter of each profile (km/s), which is added to its velocity; empty if there is none.
     pub fn zero_points_kms(&self) -> Vec<f64> {
         if self.velocity_jitter_kms == 0.0 {
             return Vec::new();

@@ -1,19 +1,19 @@
-//! From the data of an epoch to the few numbers that hold what they say of the field.
+//! Compression of the data of an epoch to the few numbers that carry its information on the field.
 //!
-//! In units of the noise, `W J S^(1/2)` with `W N W^T = 1` has few singular values that count: a profile has so many
-//! resolution elements. Along directions Q of the data that hold these, the field is as it is; along all others it
-//! is that around which the model was made linear, and there is white noise beside it (`docs/method.md` section 9).
+//! In units of the noise, `W J S^(1/2)` with `W N W^T = 1` has few significant singular values: as many as a profile
+//! has resolution elements. Along the directions Q of the data that contain these, the field is free; along all others
+//! it is fixed at the expansion point, with white noise (`docs/method.md` section 9).
 //!
-//! Misfit and slopes are made directions of Q, which makes more exact than one might think: in the most probable field
-//! `C^-1 r = N^-1 misfit`, so that it, and the gradient there, do not depend on what is left out. ln Z and the
-//! information do: ln Z by less than half of the variance left out, [`Compression::left_out`] in every epoch.
+//! Misfit and slopes are included in Q, which makes several results exact: in the most probable field `C^-1 r = N^-1
+//! misfit`, so that it, and the gradient there, do not depend on what is left out. ln Z and the information do: ln Z by
+//! less than half of the variance left out, [`Compression::left_out`] in every epoch.
 
 use super::epoch::Epoch;
 use nalgebra::{DMatrix, DVector, DVectorView};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// How much may be lost.
+/// The tolerated loss.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Compression {
@@ -28,25 +28,26 @@ impl Default for Compression {
     }
 }
 
-/// Steps after which eigenvalues are given up: some 2 a number are usual, and of what is not finite there is no end.
+/// Largest number of steps for eigenvalues: some 2 per number are usual, and for non-finite input the iteration does
+/// not end.
 const MOST_ROTATIONS: usize = 10_000;
 
-/// How the data of an epoch are told in few numbers.
+/// The compression of an epoch.
 #[derive(Clone, Debug)]
 pub struct Compressed {
     /// W (data, data), lower triangular.
     whiten: DMatrix<f64>,
     /// Q (data, kept), orthonormal.
     directions: DMatrix<f64>,
-    /// `Q^T W J c0`, which makes a residual of a misfit; where the model is divided by anything one more, for the
-    /// volume (`tilt`), which has no misfit: 0 until that is counted.
+    /// `Q^T W J c0`, which turns a misfit into a residual; where the model is divided by a continuum, one more number
+    /// for the volume (`tilt`), which has no misfit: 0 until that is included.
     pub expected: DVector<f64>,
-    /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and what
-    /// is beside them.
+    /// Terms of ln Z beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and the
+    /// density of other data.
     pub constant: f64,
 }
 
-/// Misfit and slopes of an epoch in these numbers, and what is along the other directions.
+/// Misfit and slopes of an epoch in these numbers, and sums along the other directions.
 #[derive(Clone, Debug)]
 pub struct Told {
     /// `Q^T W (misfit + J c0)`.
@@ -62,10 +63,10 @@ pub struct Told {
 }
 
 impl Compressed {
-    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
-    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers), both with a
-    /// row of zeros where the model is divided by anything. As many epochs as are `sharing` that lose of it together.
-    /// `None` where the covariance of the noise has no Cholesky factor.
+    /// The compression of an epoch linearised around the coefficients `around` (H), which have these prior standard
+    /// deviations `sd`; its `Q^T W J S^(1/2)` (kept, H), and its common columns, `Q^T W B` (kept, numbers), both with a
+    /// row of zeros where the model is divided by a continuum. The tolerated loss applies to the sum of `sharing`
+    /// epochs. `None` where the covariance of the noise has no Cholesky factor.
     pub fn new(
         epoch: &Epoch,
         around: DVectorView<f64>,
@@ -98,7 +99,7 @@ impl Compressed {
         Some((Compressed { whiten, directions, expected, constant }, [rows, common]))
     }
 
-    /// Misfit (data) and slopes (data, columns) of this epoch, those of which it was made or others.
+    /// Misfit (data) and slopes (data, columns) of this epoch, those it was made from or others.
     pub fn tell(&self, misfit: &DVector<f64>, slopes: &DMatrix<f64>) -> Told {
         let (misfit, slopes) = (&self.whiten * misfit, &self.whiten * slopes);
         let (kept, kept_slopes) = (self.directions.tr_mul(&misfit), self.directions.tr_mul(&slopes));
@@ -119,8 +120,8 @@ impl Compressed {
     }
 }
 
-/// Orthonormal directions (data, kept) that hold all of this `covariance` (data, data) but what may be lost; `None` if
-/// that is not finite.
+/// Orthonormal directions (data, kept) that contain all of this `covariance` (data, data) but the tolerated loss;
+/// `None` if that is not finite.
 pub fn leading_directions(covariance: DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
     let n = covariance.nrows();
     let eigen = covariance.try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS)?;
@@ -135,14 +136,14 @@ pub fn leading_directions(covariance: DMatrix<f64>, how: Compression) -> Option<
     Some(if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) })
 }
 
-/// Orthonormal directions that hold some more columns, too.
+/// Orthonormal directions extended by some more columns.
 pub fn with_directions<C: nalgebra::Dim, S: nalgebra::Storage<f64, nalgebra::Dyn, C>>(
     mut directions: DMatrix<f64>,
     more: &nalgebra::Matrix<f64, nalgebra::Dyn, C, S>,
 ) -> DMatrix<f64> {
     for column in more.column_iter() {
         let mut rest = column - &directions * directions.tr_mul(&column);
-        // once more, for the first time leaves rounding errors of the size of the column
+        // twice, as the first pass leaves rounding errors of the size of the column
         rest -= &directions * directions.tr_mul(&rest);
         let norm = rest.norm();
         if norm > 1e-10 * column.norm() {

@@ -1,5 +1,5 @@
-//! The covariance `C = J K J^T + 1` of the numbers of all epochs, and what they have in common, factored: dense for as
-//! many numbers as it is faster for, by a filter in time beyond. Both are the same Cholesky factor.
+//! The covariance `C = J K J^T + 1` of the numbers of all epochs and their common columns, factored: dense where that
+//! is faster, by a filter in time for more numbers. Both give the same Cholesky factor.
 
 use super::Kernel;
 use super::dense::Factor;
@@ -10,7 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
-/// Products with random signs from which a filter has the diagonal of the inverse.
+/// Products with random signs from which a filter estimates the diagonal of the inverse.
 const PROBES: usize = 32;
 
 /// Cholesky factor `L L^T` of the covariance.
@@ -23,8 +23,8 @@ pub enum Covariance {
 }
 
 impl Covariance {
-    /// Dense of numbers whose `spatial` part is given, or else a filter, with directions of coefficients `near` those
-    /// that it sees (H, directions), if they are known. `None` where it is not positive definite or not finite.
+    /// Dense where the `spatial` part is given, else a filter, with directions of coefficients `near` the observed ones
+    /// (H, directions), if known. `None` where it is not positive definite or not finite.
     pub fn new(
         numbers: &Numbers,
         spatial: Option<DMatrix<f64>>,
@@ -37,8 +37,8 @@ impl Covariance {
         }
     }
 
-    /// Directions of the coefficients, in units of their standard deviations, that epochs see (H, directions); `None`
-    /// of a dense factor, which does not ask.
+    /// Directions of the coefficients, in units of their standard deviations, that epochs constrain (H, directions);
+    /// `None` for a dense factor, which does not need them.
     pub fn directions(&self) -> Option<&DMatrix<f64>> {
         match self {
             Covariance::Dense(_) => None,

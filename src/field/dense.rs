@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn, MatrixView};
 use rayon::prelude::*;
 
-/// Columns of a block.
+/// Columns per block.
 const BLOCK: usize = 64;
 
 /// Lower triangle (diagonal blocks whole) of `A A^T`, for A (n, m); what is above is zero.
@@ -53,7 +53,7 @@ pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product
 }
 
-/// The transpose of some rows (first, number), as they stand in memory. For the right side of a product alone: on the
+/// The transpose of some rows (first, number), in their order in memory. For the right side of a product alone: on the
 /// left of few columns nalgebra 0.34 reads beyond its end.
 pub(super) fn rows_turned(matrix: &DMatrix<f64>, (first, rows): (usize, usize)) -> Turned<'_> {
     let (n, columns) = matrix.shape();
@@ -61,7 +61,7 @@ pub(super) fn rows_turned(matrix: &DMatrix<f64>, (first, rows): (usize, usize)) 
     MatrixView::from_slice_with_strides_generic(from, Dyn(columns), Dyn(rows), Dyn(n), Dyn(1))
 }
 
-/// Columns whose numbers do not stand side by side.
+/// Columns whose numbers are not contiguous.
 type Turned<'a> = MatrixView<'a, f64, Dyn, Dyn, Dyn, Dyn>;
 
 /// First column and number of columns of every block.
@@ -74,7 +74,7 @@ pub(super) fn inverses(numbers: &[f64]) -> Vec<f64> {
     numbers.iter().map(|x| if *x > 0.0 { x.recip() } else { 0.0 }).collect()
 }
 
-/// Multiplies each row by a factor of its own.
+/// Multiplies each row by its own factor.
 pub(super) fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
     for mut column in matrix.column_iter_mut() {
         column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
@@ -84,7 +84,7 @@ pub(super) fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
 /// Cholesky factor `L L^T` of a symmetric, positive definite matrix.
 #[derive(Clone, Debug)]
 pub struct Factor {
-    /// L; what stands above the diagonal blocks is not looked at.
+    /// L; entries above the diagonal blocks are not read.
     lower: DMatrix<f64>,
     /// Inverses of the diagonal blocks of L.
     inverses: Vec<DMatrix<f64>>,
@@ -230,8 +230,8 @@ mod tests {
         }
     }
 
-    /// What makes results the same on all processors with AVX2, how wide their registers are: every number of a product
-    /// is one chain of fused sums, in the order of the rows, in parts of 256.
+    /// Why results are identical on all processors with AVX2, whatever the width of their registers: every number of a
+    /// product is one chain of fused sums, in the order of the rows, in parts of 256.
     #[test]
     fn products_are_sums_in_one_order() {
         #[cfg(target_arch = "x86_64")]

@@ -1,16 +1,16 @@
-//! How ln Z changes with what is assumed of the field (`docs/method.md` section 9): `1/2 a^T dC a - 1/2 tr(C^-1 dC)`
-//! with a = `C^-1 r`, for `dC = J dK J^T`.
+//! Derivatives of ln Z with respect to the hyperparameters of the field (`docs/method.md` section 9): `1/2 a^T dC a -
+//! 1/2 tr(C^-1 dC)` with a = `C^-1 r`, for `dC = J dK J^T`.
 
 use super::Evidence;
 use super::dense;
 use nalgebra::DMatrix;
 
-/// Derivatives of ln Z with respect to the hyperparameters, model and residuals held as they are linearised.
+/// Derivatives of ln Z with respect to the hyperparameters, with the linearisation of model and residuals fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives {
     /// By ln amplitude.
     pub ln_amplitude: f64,
-    /// By the slope of the spectrum.
+    /// By the power-law index of the spectrum.
     pub slope: f64,
     /// By ln lifetime; 0 for a static field.
     pub ln_lifetime: f64,
@@ -20,7 +20,7 @@ pub struct Derivatives {
 
 impl Evidence {
     /// Derivatives of ln Z with respect to the hyperparameters, with dense matrices of all numbers: twice the work of
-    /// ln Z again.
+    /// ln Z.
     ///
     /// # Panics
     /// Where C is positive definite in time, but not as a dense matrix.

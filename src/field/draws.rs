@@ -1,4 +1,4 @@
-//! Fields drawn at random: before the data, and after them.
+//! Random fields from the prior and from the posterior.
 
 use super::epoch::in_common;
 use super::{Compression, Degrees, Epoch, Evidence, Field, FieldError};
@@ -6,15 +6,15 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::StandardNormal;
 
-/// Variances over the largest below which rounding is all there is.
+/// Ratio to the largest variance below which variances are rounding errors.
 const ROUNDING: f64 = 1e-13;
 
 impl Field {
-    /// Coefficients (H, times) of a field of harmonics of these `degrees` (H) at some times (d), before any data.
+    /// Coefficients (H, times) of a field of harmonics of these `degrees` (H) at some times (d), from the prior.
     pub fn drawn(&self, degrees: &Degrees, times_d: &[f64], rng: &mut impl Rng) -> DMatrix<f64> {
         let correlation =
             DMatrix::from_fn(times_d.len(), times_d.len(), |j, k| self.kernel.at(times_d[j] - times_d[k]));
-        // the symmetric root does not hang on the signs of eigenvectors
+        // the symmetric root does not depend on the signs of eigenvectors
         let mut eigen = correlation.symmetric_eigen();
         let least = ROUNDING * eigen.eigenvalues.amax();
         eigen.eigenvalues.apply(|variance| *variance = if *variance > least { variance.sqrt() } else { 0.0 });
@@ -28,9 +28,9 @@ impl Field {
 }
 
 impl Evidence {
-    /// Coefficients (H, times) at some times (d) drawn from the field after the data, `epochs` being those that this
-    /// evidence is of: a field before the data, plus what the most probable field of the data has beyond that of data
-    /// simulated with it (Matheron's rule).
+    /// Coefficients (H, times) at some times (d) drawn from the posterior, `epochs` being those of this evidence: a
+    /// prior field, plus the most probable field of the data minus that of data simulated with the prior field
+    /// (Matheron's rule).
     ///
     /// # Errors
     /// Those of [`Evidence::new`].
@@ -87,7 +87,7 @@ mod tests {
         }
         let variance = field.spectrum.variances(&degrees)[0];
         let expected = DMatrix::from_fn(3, 3, |j, k| variance * field.kernel.at(times[j] - times[k]));
-        // errors of 20,000 draws are 1 % of a variance
+        // the standard error of a variance from 20,000 draws is 1 %
         assert!((sum - expected).amax() < 0.04 * variance);
     }
 

@@ -4,7 +4,7 @@ use super::{FieldError, Jacobian};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, Storage};
 
-/// What was measured at one time, and how it depends on the coefficients of the field there: `data - model(c)` is
+/// The measurements at one time, and their dependence on the coefficients of the field there: `data - model(c)` is
 /// `misfit - J (c - c0)` to first order, for the coefficients c0 around which the model was made linear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Epoch {
@@ -17,26 +17,25 @@ pub struct Epoch {
     /// Variance of the noise of each datum (positive).
     pub variance: DVector<f64>,
     /// Change of the model by each nuisance of this epoch, per standard deviation of its prior (data, nuisances): they
-    /// are integrated out. No columns: no nuisances.
+    /// are marginalised over. No columns: no nuisances.
     pub nuisances: DMatrix<f64>,
-    /// ln of the density of data of this time that say nothing of the field, and are not among these; 0 if there are
+    /// ln of the density of data of this time that do not depend on the field, and are not among these; 0 if there are
     /// none.
     pub beside: f64,
-    /// D' (data, columns): change of the model by each number whose gradient and information are asked for, for example
+    /// D' (data, columns): change of the model by each number whose gradient and information are requested, for example
     /// the velocity. The same number of columns, perhaps none, in every epoch.
     pub slopes: DMatrix<f64>,
-    /// Change of the model by each number that epochs have in common, per standard deviation of its prior (data,
-    /// numbers): they are integrated out, one of each for all epochs. The same number of columns in every epoch that
-    /// has any.
+    /// Change of the model by each number common to epochs, per standard deviation of its prior (data, numbers): they
+    /// are marginalised over, one of each for all epochs. The same number of columns in every epoch that has any.
     pub common: DMatrix<f64>,
-    /// Derivative, with respect to the coefficients (H), of the logarithm of what the model is divided by, such as a
-    /// continuum that is that of the same field; no elements where there is none.
+    /// Derivative, with respect to the coefficients (H), of the logarithm of the divisor of the model, such as a
+    /// continuum from the same field; no elements where there is none.
     pub divisor: DVector<f64>,
 }
 
 impl Epoch {
-    /// A single datum at a time (d), beside no nuisances or slopes: the derivative of the model (1, H), data minus
-    /// model, standard error, and what it has of each number in common (1, numbers).
+    /// A single datum at a time (d), without nuisances or slopes: the derivative of the model (1, H), data minus model,
+    /// standard error, and its common columns (1, numbers).
     pub fn of_datum(time_d: f64, row: DMatrix<f64>, misfit: f64, sigma: f64, common: DMatrix<f64>) -> Self {
         Epoch {
             time_d,
@@ -75,9 +74,9 @@ impl Epoch {
             && self.variance.iter().all(|v| v.is_finite() && *v > 0.0)
     }
 
-    /// With noise of its own on each number of which there are slopes, of these standard deviations (columns): more
-    /// nuisances. A velocity jitter is this, with slopes `D'`; one that is integrated out of the quadratic alone leaves
-    /// the most probable field as it is without.
+    /// With independent noise of these standard deviations (columns) on each number that has slopes: more nuisances. An
+    /// RV jitter is one, with slopes `D'`; if it is marginalised over in the quadratic only, the most probable field is
+    /// that without jitter.
     #[must_use]
     pub fn jittered(mut self, sd: &[f64]) -> Self {
         assert_eq!(sd.len(), self.slopes.ncols(), "standard deviations of all numbers of an epoch");
@@ -89,8 +88,7 @@ impl Epoch {
         self
     }
 
-    /// `N^-1` times columns (data, columns), N without what epochs have in common; `None` where that has no Cholesky
-    /// factor.
+    /// `N^-1` times columns (data, columns), N without the common columns; `None` where N has no Cholesky factor.
     pub(super) fn weighed<C: Dim, S: Storage<f64, Dyn, C>>(
         &self,
         columns: &Matrix<f64, Dyn, C, S>,
@@ -106,7 +104,7 @@ impl Epoch {
         Some(weighed)
     }
 
-    /// Panics where shapes do not go together: that is a mistake of the program.
+    /// Panics where shapes do not match: a programming error.
     pub(super) fn check_shapes(&self, coefficients: usize) {
         let n = self.len();
         assert_eq!(self.jacobian.shape(), (n, coefficients), "J of an epoch");
@@ -127,7 +125,7 @@ impl Epoch {
     }
 }
 
-/// `J^T N^-1 misfit` of all epochs (H, epochs), what they have in common being among the noise.
+/// `J^T N^-1 misfit` of all epochs (H, epochs), with the common columns as part of the noise.
 ///
 /// With N0 the noise of the epochs apart and B their common columns, `N^-1 = N0^-1 - V (1 + B^T V)^-1 V^T`, `V = N0^-1
 /// B`.
@@ -164,7 +162,7 @@ pub(super) fn pulled(epochs: &[Epoch]) -> Result<DMatrix<f64>, FieldError> {
     Ok(all)
 }
 
-/// How many numbers the epochs have in common.
+/// Number of columns common to the epochs.
 pub(super) fn in_common(epochs: &[Epoch]) -> usize {
     epochs.iter().map(|epoch| epoch.common.ncols()).max().unwrap_or(0)
 }

@@ -1,11 +1,11 @@
 //! The evidence of data that are linear in a Gaussian field (`docs/method.md` section 9).
 //!
 //! With `C = J K J^T + N` over all epochs, `K = S_h k(t - t')`, and residual `r = misfit + J c0`: `ln Z = -1/2 r^T C^-1
-//! r - 1/2 ln |C| - n/2 ln 2 pi` (n data), the density of the data with all fields and nuisances integrated out;
-//! gradient and information of numbers that change the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in
-//! units of the noise and compressed, where N is 1, but for what epochs have in common, which adds `B B^T` over all.
+//! r - 1/2 ln |C| - n/2 ln 2 pi` (n data), the density of the data marginalised over all fields and nuisances; gradient
+//! and information of numbers that change the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in units of
+//! the noise and compressed, where N is 1, except for the common columns, which add `B B^T` over all.
 //!
-//! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile, or in proportion to n'
+//! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers per profile, or in proportion to n'
 //! by a filter in time (`covariance`; `benches/field.rs`: 0.04 s for 40 profiles, 0.3 for 100, 2.0 for 200, 4.3 for
 //! 400; half of that where another field of the same star is known).
 
@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// Data with the field integrated out.
+/// Data marginalised over the field.
 #[derive(Clone, Debug)]
 pub struct Evidence {
     pub(super) field: Field,
@@ -41,22 +41,22 @@ pub struct Evidence {
     explained: OnceLock<Vec<f64>>,
 }
 
-/// What the evidence of a field and a star nearby tells of another one.
+/// Results for a nearby field and star that are used again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Nearby {
-    /// How many numbers of each epoch the field explains, if that is not to be found anew.
+    /// How many numbers of each epoch the field explains, if that is not to be computed again.
     pub explained: Option<Vec<f64>>,
-    /// Directions of the coefficients that epochs see (H, directions), where that was asked for.
+    /// Directions of the coefficients that epochs constrain (H, directions), if requested.
     pub seen: Option<DMatrix<f64>>,
 }
 
 impl Evidence {
-    /// Of epochs that are linear around the coefficients `around` (H, epochs), for a field of harmonics of these
-    /// `degrees` (H).
+    /// The evidence of epochs that are linear around the coefficients `around` (H, epochs), for a field of harmonics of
+    /// these `degrees` (H).
     ///
     /// # Errors
-    /// [`FieldError::NoSuchField`], [`FieldError::NotFinite`] and [`FieldError::NotPositive`]. Shapes that do not go
-    /// together panic.
+    /// [`FieldError::NoSuchField`], [`FieldError::NotFinite`] and [`FieldError::NotPositive`]. Shapes that do not match
+    /// panic.
     pub fn new(
         field: Field,
         degrees: &Degrees,
@@ -67,7 +67,7 @@ impl Evidence {
         Evidence::of(field, degrees, (epochs, around), how, Nearby::default())
     }
 
-    /// The same with what is known from the evidence of a field and a star nearby.
+    /// The same with known results of the evidence of a field and a star nearby.
     pub(super) fn of(
         field: Field,
         degrees: &Degrees,
@@ -127,7 +127,7 @@ impl Evidence {
         Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic, explained: own })
     }
 
-    /// Directions of the coefficients that epochs see (H, directions), where that was asked for.
+    /// Directions of the coefficients that epochs constrain (H, directions), if requested.
     pub(super) fn seen(&self) -> Option<DMatrix<f64>> {
         let mut directions = self.covariance.directions()?.clone();
         scale_rows(&mut directions, &inverses(&self.sd));
@@ -144,7 +144,7 @@ impl Evidence {
         self.numbers.rows.nrows()
     }
 
-    /// How many numbers of each epoch the field explains; `None` where no model is divided by anything.
+    /// How many numbers of each epoch the field explains; `None` where no model is divided by a continuum.
     pub(crate) fn explained(&self) -> Option<&[f64]> {
         let tilt = self.tilt.as_ref()?;
         let found = || {
@@ -171,7 +171,7 @@ impl Evidence {
 
     /// The same with other misfits (at the same coefficients) and slopes of all epochs, of another orbit for example,
     /// while design and noise stay: a thousandth of the work. Along the directions that were compressed away the new
-    /// misfits are taken for noise.
+    /// misfits count as noise.
     ///
     /// # Errors
     /// [`FieldError::NotFinite`]. Shapes other than those of the epochs panic.
@@ -181,12 +181,11 @@ impl Evidence {
         Ok(quadratic(&self.covariance, &whitened, &self.epochs, &told))
     }
 
-    /// The same without each of these groups of epochs (ascending): what `then` makes of the quadratic of all others.
-    /// The maps that the model is linear around, and the tilt, are those of all epochs; otherwise those left out might
-    /// never have been.
+    /// The same without each of these groups of epochs (ascending): `then` applied to the quadratic of all others.
+    /// Expansion point and tilt are those of all epochs; otherwise the result does not depend on the epochs left out.
     ///
-    /// With `P = C^-1` and B the residual and all slopes, those left out being s: `B^T P B - (P B)_s^T P_ss^-1 (P B)_s`
-    /// in place of `B^T P B`.
+    /// With `P = C^-1` and B the residual and all slopes, with s the epochs left out: `B^T P B - (P B)_s^T P_ss^-1 (P
+    /// B)_s` in place of `B^T P B`.
     ///
     /// # Errors
     /// As there; [`FieldError::NotPositive`] of a group. Groups that are not ascending panic.
@@ -224,8 +223,8 @@ impl Evidence {
         Ok(groups.par_iter().map(without).collect())
     }
 
-    /// chi2 of each epoch as all others predict it, of these misfits: with `a = C^-1 r`, `a_k^T [(C^-1)_kk]^-1 a_k`
-    /// (Rasmussen & Williams 2006, equations 5.10 to 5.12, for blocks), and what is compressed away.
+    /// chi2 of each epoch as all others predict it, for these misfits: with `a = C^-1 r`, `a_k^T [(C^-1)_kk]^-1 a_k`
+    /// (Rasmussen & Williams 2006, equations 5.10 to 5.12, for blocks), plus the part that is compressed away.
     ///
     /// # Errors
     /// As [`Evidence::without_each`].
@@ -265,7 +264,7 @@ impl Evidence {
 }
 
 impl Covariance {
-    /// `L^-1` times the residual and then the slopes, each of which is zero but in the rows of its epoch.
+    /// `L^-1` times the residual and then the slopes, each of which is zero outside the rows of its epoch.
     fn whitened(&self, told: &[Told], parts: &[Range<usize>]) -> DMatrix<f64> {
         let per_epoch = told.first().map_or(0, |of| of.slopes.ncols());
         let mut columns = DMatrix::zeros(parts.last().map_or(0, |part| part.end), 1 + per_epoch * told.len());
@@ -280,7 +279,7 @@ impl Covariance {
     }
 }
 
-/// ln Z, gradient and information of misfits and slopes as told by `epochs`, `whitened`.
+/// ln Z, gradient and information of misfits and slopes as compressed by `epochs`, `whitened`.
 fn quadratic(covariance: &Covariance, whitened: &DMatrix<f64>, epochs: &[Compressed], told: &[Told]) -> Quadratic {
     let (residual, slopes) = (whitened.column(0), whitened.columns_range(1..));
     let mut gradient = slopes.tr_mul(&residual);
@@ -329,7 +328,7 @@ mod tests {
         Field { spectrum, kernel: Kernel::of(Lifetime::Days(3.0)) }
     }
 
-    /// Whatever it was told, the field explains as much.
+    /// The number of explained data does not depend on the start.
     #[test]
     fn how_much_the_field_explains_is_its_own() {
         let of = |explained: Option<Vec<f64>>| {

@@ -2,13 +2,13 @@
 //! (`docs/method.md` section 9).
 //!
 //! Matern 3/2 is a state space of two numbers, value v and rate w (over `sqrt(3) / lifetime`), which are independent of
-//! each other and of unit variance at any one time; `a = sqrt(3) delay / lifetime` later they are
-//! `e^-a [(1 + a) v + a w]` and `e^-a [(1 - a) w - a v]`, and independent noise (Hartikainen & Sarkka 2010). What
-//! never changes is a number of its own, and so is each number that epochs have in common. Innovations over their
-//! standard deviations are `L^-1` times the data, for the L with `L L^T = C`, epochs in the order of time.
+//! each other and of unit variance at any one time; `a = sqrt(3) delay / lifetime` later they are `e^-a [(1 + a) v + a
+//! w]` and `e^-a [(1 - a) w - a v]`, and independent noise (Hartikainen & Sarkka 2010). The static part is a separate
+//! number, and so is each number common to epochs. Innovations over their standard deviations are `L^-1` times the
+//! data, for the L with `L L^T = C`, epochs in the order of time.
 //!
-//! States are those of the few directions of the coefficients that all profiles together see: all coefficients in
-//! units of their standard deviations have the same correlation in time, so that any orthonormal directions have.
+//! States are the few directions of the coefficients that all profiles together constrain: all coefficients in units of
+//! their standard deviations have the same correlation in time, so that any orthonormal directions have.
 
 use super::Kernel;
 use super::compress::with_directions;
@@ -24,10 +24,10 @@ use std::ops::Range;
 /// Largest variance, over that of the noise, of all numbers of all epochs together along directions that are left out.
 const LEFT_OUT: f64 = 1e-3;
 
-/// Directions that are looked for at once.
+/// Directions sought at once.
 const AT_ONCE: usize = 64;
 
-/// Columns of the states' covariance that are changed at once, to stay in the cache.
+/// Columns of the states' covariance that are updated at once, to stay in the cache.
 const COLUMNS: usize = 32;
 
 /// The factor L, an epoch at a time.
@@ -35,24 +35,24 @@ const COLUMNS: usize = 32;
 pub struct Filter {
     /// In the order of time.
     steps: Vec<Step>,
-    /// Numbers of a state: rates, which no profile sees; then values, numbers that never change, numbers in common.
+    /// Elements of a state: rates, which no profile observes; then values, static numbers, common numbers.
     states: usize,
-    /// How many rates there are.
+    /// Number of rates.
     rates: usize,
-    /// Orthonormal directions of the coefficients that epochs see (H, directions).
+    /// Orthonormal directions of the coefficients that epochs constrain (H, directions).
     pub directions: DMatrix<f64>,
 }
 
 /// An epoch.
 #[derive(Clone, Debug)]
 struct Step {
-    /// Where its numbers stand.
+    /// The range of its numbers.
     part: Range<usize>,
-    /// Time since the epoch before, in units of the lifetime: a.
+    /// Time since the previous epoch, in units of the lifetime: a.
     passed: f64,
-    /// What it sees of a state but its rates (numbers, states - rates).
+    /// Design with respect to the state without its rates (numbers, states - rates).
     seen: DMatrix<f64>,
-    /// What a whitened innovation changes of a state (states, numbers).
+    /// Gain: change of the state per whitened innovation (states, numbers).
     gain: DMatrix<f64>,
     /// L of the innovation's covariance, and its inverse.
     lower: DMatrix<f64>,
@@ -129,11 +129,11 @@ fn mix_all(states: &mut DMatrix<f64>, rates: usize, factors: [f64; 4]) {
     }
 }
 
-/// The covariance of the states (states, states), updated in one pass an epoch.
+/// The covariance of the states (states, states), updated in one pass per epoch.
 struct Spread {
     covariance: DMatrix<f64>,
     rates: usize,
-    /// What the epoch before told of it: `gain gain^T` less.
+    /// Update by the previous epoch: minus `gain gain^T`.
     told: Option<DMatrix<f64>>,
 }
 
@@ -142,13 +142,13 @@ impl Spread {
         Spread { covariance: DMatrix::identity(states, states), rates, told: None }
     }
 
-    /// Goes on to the next epoch, that sees of a state but its rates what is `seen` (numbers, states - rates): the
-    /// covariance of the states and these numbers (states, numbers).
+    /// Goes on to the next epoch, whose design without rates is `seen` (numbers, states - rates): the covariance of the
+    /// states and these numbers (states, numbers).
     fn go_on(&mut self, passage: Option<Passage>, seen: &DMatrix<f64>) -> DMatrix<f64> {
         let (states, rates) = (self.covariance.nrows(), self.rates);
         let (told, passage) = (self.told.take(), passage.filter(|_| rates > 0));
         let (told, passage) = (told.as_ref(), passage.as_ref());
-        // columns of rates, of their values, and of what has no rate, a block of each at a time
+        // columns of rates, of their values, and of numbers without a rate, one block of each at a time
         let block = (COLUMNS * states).max(1);
         let (of_rates, of_values) = self.covariance.as_mut_slice().split_at_mut(rates * states);
         let (of_values, alone) = of_values.split_at_mut(rates * states);
@@ -180,14 +180,14 @@ impl Spread {
             let turned = seen.columns(first, width).transpose();
             DMatrixView::from_slice(of_values, states, width) * turned
         });
-        // in the order of the blocks, whoever made them
+        // in the order of the blocks, whichever thread made them
         let parts: Vec<DMatrix<f64>> = parts.collect();
         parts.iter().fold(DMatrix::zeros(states, seen.nrows()), |along, part| along + part)
     }
 }
 
 impl Filter {
-    /// With the directions that epochs see, as far as they are known from others near by (H, directions). `None` where
+    /// With the directions that epochs constrain, as far as known from a nearby factor (H, directions). `None` where
     /// the covariance is not positive definite or not finite.
     pub fn new(
         Numbers { times_d, parts, rows, common }: &Numbers,
@@ -203,7 +203,7 @@ impl Filter {
             }
         };
         let share = if kernel.is_static() { 1.0 } else { kernel.persistent };
-        // of what changes and what does not
+        // of the evolving and the static part
         let shares: Vec<f64> = [1.0 - share, share].into_iter().filter(|share| *share > 0.0).map(f64::sqrt).collect();
         let rates = if kernel.is_static() { 0 } else { directions.ncols() };
         let width = shares.len() * directions.ncols() + common.ncols();
@@ -280,11 +280,11 @@ impl Filter {
     }
 }
 
-/// The directions `near` (H, directions) made orthonormal, and what `rows` (n, H) see of them (n, directions); `None`
-/// where they see more.
+/// The directions `near` (H, directions) made orthonormal, and the projection of `rows` (n, H) on them (n, directions);
+/// `None` where `rows` has more directions.
 fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let mut directions = near.transpose();
-    // twice, for the first time leaves errors of the square of the condition
+    // twice, as the first pass leaves errors of the square of the condition
     for _ in 0..2 {
         let factor = Factor::new(dense::gram(&directions))?;
         factor.forward_from(&mut directions, &vec![0; near.nrows()]);
@@ -294,9 +294,9 @@ fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f
     (rows.norm_squared() - seen.norm_squared() <= LEFT_OUT).then_some((directions, seen))
 }
 
-/// Orthonormal directions (H, few) that hold all of `rows` (n, H) but what may be lost: blocks of random ones, turned
-/// towards the largest by two products with `rows^T rows` (Halko, Martinsson & Tropp 2011). `None` where that is not
-/// finite.
+/// Orthonormal directions (H, few) that contain all of `rows` (n, H) but the tolerated loss: blocks of random ones,
+/// turned towards the largest by two products with `rows^T rows` (Halko, Martinsson & Tropp 2011). `None` where that is
+/// not finite.
 fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut products = dense::gram_of_columns(rows);
     products.fill_upper_triangle_with_lower_triangle();
@@ -321,9 +321,9 @@ fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     all.is_finite().then_some(directions)
 }
 
-/// Orthonormal columns of what `block` has beside `directions`; `None` where it is not finite.
+/// Orthonormal columns of the part of `block` orthogonal to `directions`; `None` where it is not finite.
 fn apart(directions: &DMatrix<f64>, mut block: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    // twice, for the first time leaves rounding errors of the size of the block
+    // twice, as the first pass leaves rounding errors of the size of the block
     for _ in 0..2 {
         let along = directions.transpose() * &block;
         block -= directions * along;
@@ -344,13 +344,13 @@ mod tests {
     use super::super::Lifetime;
     use super::*;
 
-    /// Numbers that look random, (n, m).
+    /// Pseudo-random numbers, (n, m).
     fn some(n: usize, m: usize) -> DMatrix<f64> {
         DMatrix::from_fn(n, m, |i, j| ((i * 7919 + j * 104_729 + i * j * 31) % 1009) as f64 / 1009.0 - 0.5)
     }
 
-    /// Epochs that are not in the order of time, two of them at the same time, of 3 to 5 numbers; of 100 coefficients
-    /// they see some 20 more and more faintly.
+    /// Epochs that are not in the order of time, two of them at the same time, of 3 to 5 numbers; they constrain some
+    /// 20 of 100 coefficients, with falling strength.
     fn numbers() -> Numbers {
         let times_d = vec![0.0, 2.5, 1.0, 9.0, 30.0, 2.5, 31.0, 30.5];
         let of = |k: usize| {

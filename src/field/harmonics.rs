@@ -3,8 +3,8 @@
 //! `Y_l0 = P_l0(sin b)`, and for m > 0 the pair `P_lm(sin b) cos(m l)`, `P_lm(sin b) sin(m l)` at longitude l and
 //! latitude b, with Legendre functions normalised so that the mean of every Y^2 over the sphere is 1 (no
 //! Condon-Shortley phase). Order: by degree; within one m = 0, then cosine and sine of m = 1, 2, ... Degree 0 is left
-//! out: profiles do not tell the mean level (`docs/method.md` section 9). The Legendre part is that of a whole ring of
-//! points of one latitude.
+//! out: profiles do not constrain the mean level (`docs/method.md` section 9). The Legendre part is that of a whole
+//! ring of points of one latitude.
 
 use super::Degrees;
 use nalgebra::DMatrix;
@@ -117,8 +117,8 @@ mod tests {
     use super::*;
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-    /// Points and weights that integrate polynomials exactly enough: midpoints in longitude, Gauss-Legendre in
-    /// latitude.
+    /// Points and weights that integrate polynomials with sufficient accuracy: midpoints in longitude, Gauss-Legendre
+    /// in latitude.
     fn sphere(n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let (mut longitudes, mut latitudes, mut weights) = (vec![], vec![], vec![]);
         for i in 0..n {

@@ -1,7 +1,7 @@
-//! How the model of an epoch changes with the coefficients of the field.
+//! The Jacobian of the model of an epoch with respect to the coefficients of the field.
 //!
-//! The large part of it, a row a datum, is that of what is divided by a continuum, and the same wherever the model is
-//! made linear: it is shared, not copied.
+//! Its large part, one row per datum, belongs to the model before division by a continuum, and is the same at every
+//! expansion point: it is shared, not copied.
 
 use super::dense::{rows_turned, scale_rows};
 use nalgebra::{DMatrix, DVector, DVectorView};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// derivative of ln s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jacobian {
-    /// A^T (H, data): products with columns of coefficients go along what stands side by side.
+    /// A^T (H, data): products with columns of coefficients run along contiguous memory.
     turned: Arc<DMatrix<f64>>,
     scale: f64,
     /// u (data) and d (H); zeros where there is no such part.
@@ -26,7 +26,7 @@ impl From<DMatrix<f64>> for Jacobian {
 }
 
 impl Jacobian {
-    /// `scale A + u d^T`, given A^T (H, data). Panics where shapes do not go together.
+    /// `scale A + u d^T`, given A^T (H, data). Panics where shapes do not match.
     pub fn new(turned: Arc<DMatrix<f64>>, scale: f64, (u, d): (DVector<f64>, DVector<f64>)) -> Self {
         assert_eq!(turned.shape(), (d.len(), u.len()), "both parts of J");
         Jacobian { turned, scale, outer: (u, d) }

@@ -1,21 +1,20 @@
-//! How the field forgets: the correlation of a coefficient with itself a time later (`docs/method.md` section 9),
-//! `k = f + (1 - f) (1 + a) exp(-a)` with `a = sqrt(3) |t - t'| / lifetime`: Matern 3/2 beside a share f that never
-//! changes.
+//! The correlation of a coefficient in time (`docs/method.md` section 9), `k = f + (1 - f) (1 + a) exp(-a)` with `a =
+//! sqrt(3) |t - t'| / lifetime`: Matern 3/2 plus a static share f.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// How long the field lives.
+/// Lifetime of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Lifetime {
-    /// For ever: the limit of long lifetimes.
+    /// Static: the limit of long lifetimes.
     Static,
     /// Scale of the Matern 3/2 kernel (d).
     Days(f64),
 }
 
 impl Lifetime {
-    /// In days; `None` for ever.
+    /// In days; `None` if static.
     pub fn days(self) -> Option<f64> {
         match self {
             Lifetime::Static => None,
@@ -28,14 +27,14 @@ impl Lifetime {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kernel {
-    /// Lifetime of what changes.
+    /// Lifetime of the evolving part.
     pub lifetime: Lifetime,
     /// Share f, in [0, 1], of the variance that does not change.
     pub persistent: f64,
 }
 
 impl Kernel {
-    /// Of a field all of which changes.
+    /// A kernel without a static part.
     pub fn of(lifetime: Lifetime) -> Self {
         Kernel { lifetime, persistent: 0.0 }
     }
@@ -61,12 +60,12 @@ impl Kernel {
         1.0 - self.changing(delay_d)
     }
 
-    /// Whether nothing changes.
+    /// Whether the field is static.
     pub fn is_static(&self) -> bool {
         self.lifetime == Lifetime::Static || self.persistent == 1.0
     }
 
-    /// Correlation of the changing part.
+    /// Correlation of the evolving part.
     fn changing(&self, delay_d: f64) -> f64 {
         self.scaled(delay_d).map_or(1.0, |a| (1.0 + a) * (-a).exp())
     }

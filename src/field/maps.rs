@@ -1,4 +1,4 @@
-//! The field after the data (`docs/method.md` section 9): its mean `c(t) = sum_k k(t - t_k) S J_k^T (C^-1 r)_k`, its
+//! The posterior of the field (`docs/method.md` section 9): its mean `c(t) = sum_k k(t - t_k) S J_k^T (C^-1 r)_k`, its
 //! standard deviation at points, and the step of Gauss-Newton that both imply.
 
 use super::dense::{inverses, scale_rows};
@@ -38,15 +38,15 @@ impl Evidence {
             self.correlate(known.columns_range_mut(..), correlations.as_slice());
             self.covariance.forward(&mut known);
             for ((after, before), known) in after.iter_mut().zip(&before).zip(known.column_iter()) {
-                // rounding may take more than there was
+                // rounding may make it negative
                 *after = (before - known.norm_squared()).max(0.0).sqrt();
             }
         }
         after
     }
 
-    /// Numbers that are linear in the field, given by a row each (numbers, H), at a time (d) each: their means and
-    /// their covariance after the data.
+    /// Posterior means and covariance of numbers that are linear in the field, each given by a row (numbers, H) and a
+    /// time (d).
     pub fn predicted(&self, rows: &DMatrix<f64>, times_d: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let coefficients = self.coefficients_at(times_d);
         let mean = DVector::from_fn(rows.nrows(), |k, _| rows.row(k).transpose().dot(&coefficients.column(k)));
@@ -70,7 +70,7 @@ impl Evidence {
         }
     }
 
-    /// The variances of such numbers before the data.
+    /// The prior variances of such numbers.
     pub fn variances_before(&self, rows: &DMatrix<f64>) -> Vec<f64> {
         let mut scaled = rows.transpose();
         scale_rows(&mut scaled, &self.sd);

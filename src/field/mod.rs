@@ -1,27 +1,26 @@
-//! Gaussian fields on the sphere and in time, integrated out of data that are linear, or nearly so, in them.
+//! Gaussian fields on the sphere and in time, marginalised over for data that are linear, or nearly so, in them.
 //!
 //! A field `x(p, t) = sum_h c_h(t) Y_h(p)`: real spherical harmonics ([`Harmonics`]) whose coefficients are independent
 //! Gaussian processes, `<c_h(t) c_h(t')> = S_h k(t - t')`, with a [`Spectrum`] S over degrees and a [`Kernel`] k in
 //! time. Units of the field and of the data are the caller's; times are days.
 //!
-//! A likelihood by these steps:
-//! 1. Say what is assumed: a [`Field`] (amplitude, slope, lifetime or static, persistent share), and the degree of each
-//!    coefficient ([`Harmonics::degrees`]).
-//! 2. Write a closure from coefficients (H, epochs) to one [`Epoch`] a profile, made linear there: time, design J,
-//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity, and what the model is divided by,
-//!    if that is of the field. Errors that go together over
-//!    neighbouring bins are larger variances; a velocity jitter that the field is to know of is
-//!    [`Epoch::jittered`].
+//! Steps to a likelihood:
+//! 1. Choose the prior: a [`Field`] (amplitude, power-law index, lifetime or static, persistent share), and the degree
+//!    of each coefficient ([`Harmonics::degrees`]).
+//! 2. Write a closure from coefficients (H, epochs) to one [`Epoch`] per profile, linearised there: time, design J,
+//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity, and the divisor of the model, if
+//!    it depends on the field. Correlated noise of neighbouring bins enters as larger variances; an RV jitter that the
+//!    fit of the field includes is [`Epoch::jittered`].
 //! 3. [`settle()`] finds the most probable coefficients, from zeros once and from those of a reference afterwards, and
-//!    gives the [`Evidence`] there (`tilt`: where exactly). For data that are linear, [`Evidence::new`] does.
-//! 4. [`Evidence::quadratic`]: ln Z, and its gradient and information in the velocities; numbers that are not asked
-//!    for, a jitter for example, go by [`Quadratic::integrated`]. [`Evidence::with`]: the same for another orbit,
+//!    gives the [`Evidence`] there (`tilt`: where exactly). For linear data, [`Evidence::new`] is enough.
+//! 4. [`Evidence::quadratic`]: ln Z, and its gradient and information in the velocities; other numbers, a jitter for
+//!    example, are marginalised over by [`Quadratic::integrated`]. [`Evidence::with`]: the same for another orbit,
 //!    design unchanged, by new misfits and slopes.
 //! 5. [`Evidence::derivatives`]: of ln Z, with respect to the hyperparameters.
-//! 6. [`Evidence::coefficients_at`], [`Evidence::means`] and [`Evidence::standard_deviations`]: the field after the
-//!    data, at any time. [`Field::drawn`] and [`Evidence::drawn`]: fields drawn before and after the data.
+//! 6. [`Evidence::coefficients_at`], [`Evidence::means`] and [`Evidence::standard_deviations`]: the posterior of the
+//!    field at any time. [`Field::drawn`] and [`Evidence::drawn`]: draws from prior and posterior.
 //!
-//! Inside, `compress` finds the few numbers of an epoch that say something of the field. `covariance` is that of all
+//! Internally, `compress` finds the few numbers of an epoch that depend on the field. `covariance` is that of all
 //! numbers, factored: `dense`, or by a Kalman `filter` for many profiles. Nearly all of the time goes there.
 
 mod compress;
@@ -56,19 +55,19 @@ pub use spectrum::{Degrees, Spectrum};
 
 use serde::{Deserialize, Serialize};
 
-/// What is assumed of a field before any data: its hyperparameters.
+/// The prior of a field: its hyperparameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Field {
-    /// How rough it is.
+    /// Its angular power spectrum.
     pub spectrum: Spectrum,
-    /// How long it lives.
+    /// Its correlation in time.
     pub kernel: Kernel,
 }
 
 /// Why there is no evidence.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FieldError {
-    /// Hyperparameters that no field has.
+    /// Invalid hyperparameters.
     #[error(
         "no field has amplitude {amplitude}, slope {slope}, lifetime {lifetime_d} d and persistent share \
     {persistent}"
@@ -76,11 +75,11 @@ pub enum FieldError {
     NoSuchField {
         /// Standard deviation of the field.
         amplitude: f64,
-        /// Slope of its spectrum.
+        /// Power-law index of its spectrum.
         slope: f64,
         /// Lifetime (d), infinite for a static field.
         lifetime_d: f64,
-        /// Share that does not change.
+        /// Static share.
         persistent: f64,
     },
     /// Data, derivatives or noise are not finite, or a variance of the noise is not positive.
@@ -92,12 +91,12 @@ pub enum FieldError {
     /// The covariance of the data is not positive definite in double precision: the field is too large for the noise.
     #[error("the covariance of the data is not positive definite: the field is too large for their noise")]
     NotPositive,
-    /// Gauss-Newton has come to no end.
+    /// Gauss-Newton has not converged.
     #[error("the most probable field was not found in {steps} steps: the last changes it by {change:.2e}")]
     NotSettled {
         /// Steps that were made.
         steps: usize,
-        /// Largest change of the field that the last step asked for.
+        /// Largest change of the field in the last step.
         change: f64,
     },
 }

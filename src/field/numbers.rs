@@ -1,4 +1,4 @@
-//! The numbers of all epochs that a field is seen by, and their covariance `C = J K J^T + 1` as a dense matrix.
+//! The compressed data of all epochs, and their covariance `C = J K J^T + 1` as a dense matrix.
 
 use super::Kernel;
 use super::dense::{self, Factor};
@@ -11,12 +11,12 @@ const FILTER_BEYOND: usize = 4000;
 /// Numbers of all epochs, in units of their noise.
 #[derive(Clone, Debug)]
 pub struct Numbers {
-    /// Times (d) of the epochs, and where the numbers of each stand.
+    /// Times (d) of the epochs, and the ranges of their numbers.
     pub times_d: Vec<f64>,
     pub parts: Vec<Range<usize>>,
     /// J S^(1/2) (n, H).
     pub rows: DMatrix<f64>,
-    /// What epochs have in common (n, numbers).
+    /// Common columns (n, numbers).
     pub common: DMatrix<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Numbers {
         dense::gram(&self.rows)
     }
 
-    /// The same, unless there are so many numbers that a filter is faster than dense matrices.
+    /// The same, unless a filter is faster than dense matrices for so many numbers.
     pub fn spatial_of_few(&self) -> Option<DMatrix<f64>> {
         (self.rows.nrows() <= FILTER_BEYOND).then(|| self.spatial())
     }
@@ -58,10 +58,10 @@ impl Numbers {
         }
     }
 
-    /// `J S^(1/2)` times coefficients (H, epochs), each epoch its own.
+    /// `J S^(1/2)` times coefficients (H, epochs), one column per epoch.
     pub fn seen(&self, coefficients: &DMatrix<f64>) -> DVector<f64> {
         let mut seen = DVector::zeros(self.rows.nrows());
-        // by columns, as they stand in memory
+        // by columns, in their order in memory
         for (rows, coefficients) in self.rows.column_iter().zip(coefficients.row_iter()) {
             for (part, coefficient) in self.parts.iter().zip(coefficients.iter()) {
                 let rows = &rows.as_slice()[part.clone()];
@@ -71,7 +71,7 @@ impl Numbers {
         seen
     }
 
-    /// `S^(1/2) J^T` times numbers (H, epochs), each epoch its own.
+    /// `S^(1/2) J^T` times numbers (H, epochs), one column per epoch.
     pub fn pulled(&self, x: &DVector<f64>) -> DMatrix<f64> {
         let x = x.as_slice();
         let dot = |rows: &[f64], x: &[f64]| rows.iter().zip(x).map(|(row, x)| row * x).sum::<f64>();

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// `ln Z(v) = ln Z + g^T v - 1/2 v^T I v` of numbers v that change the models of the epochs by slopes `D' v`: exactly
-/// so as long as the design and the slopes are those at v = 0. The numbers of one epoch stand together.
+/// so as long as the design and the slopes are those at v = 0. The numbers of one epoch are contiguous.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quadratic {
     /// ln Z at v = 0, all constants included.
@@ -21,7 +21,8 @@ impl Quadratic {
     }
 
     /// The same where numbers x of a Gaussian of this `mean` and standard deviations `sd` are added, `v + columns x`,
-    /// and integrated out. `None` where the information is not finite. A jitter of each number is columns of their own.
+    /// and marginalised over. `None` where the information is not finite. An independent jitter of each number has one
+    /// column each.
     pub fn integrated(&self, columns: &DMatrix<f64>, mean: &DVector<f64>, sd: &DVector<f64>) -> Option<Self> {
         let shift = columns * mean;
         let pulled_by = &self.information * &shift;

@@ -1,10 +1,10 @@
-//! The most probable field of data that are not linear in it: Gauss-Newton, of which every step is the linear answer
-//! (`docs/method.md` section 9).
+//! The most probable field of data that are not linear in it: Gauss-Newton, each step of which solves the linear
+//! problem (`docs/method.md` section 9).
 //!
-//! The largest change of the field in a step is limited: far from the answer the linear model promises too much. Start
-//! from no field at all or from the answer of the same hyperparameters nearby; from that of others it may not come
-//! back. Where the field hardly changes any more, steps by the covariance of an earlier one come nearer as well, and
-//! cost next to nothing: each is mixed with those before, and leaves some fifth of the way.
+//! The largest change of the field in a step is limited: far from the solution the linear model overestimates the gain.
+//! Start from no field or from a nearby solution with the same hyperparameters; from other solutions the iteration may
+//! not converge. Where the field hardly changes, steps with the covariance of an earlier iteration converge as well at
+//! almost no cost: each is mixed with those before, and leaves some fifth of the distance.
 
 use super::epoch::pulled;
 use super::evidence::Nearby;
@@ -13,22 +13,22 @@ use super::{Compression, Degrees, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Largest change of the field in a step over that in the step before the last, up to which one covariance will do;
-/// and for how many steps.
+/// Largest change of the field in a step over that in the step before the last, up to which one covariance is kept; and
+/// for how many steps.
 const FALLS: f64 = 0.9;
 const FROZEN: usize = 10;
 
-/// Steps that one is mixed with.
+/// Number of earlier steps mixed with each step.
 const MIXED: usize = 3;
 
-/// What is looked for.
+/// The problem to solve.
 #[derive(Clone, Copy, Debug)]
 pub struct Sought<'a> {
-    /// The field before the data.
+    /// The prior of the field.
     pub field: Field,
     /// Degrees of the coefficients (H).
     pub degrees: &'a Degrees,
-    /// Harmonics (points, H) of the points at which changes of the field are watched: some hundred.
+    /// Harmonics (points, H) of the points at which changes of the field are monitored: some hundred.
     pub watched: &'a DMatrix<f64>,
 }
 
@@ -38,7 +38,7 @@ pub struct Sought<'a> {
 pub struct Settling {
     /// Most steps.
     pub steps: usize,
-    /// Largest change of the field, at the points that are watched, that ends it.
+    /// Largest change of the field, at the monitored points, at convergence.
     pub tolerance: f64,
     /// Largest change of the field in a step.
     pub longest: f64,
@@ -59,21 +59,21 @@ pub struct Settled {
     pub coefficients: DMatrix<f64>,
     /// The evidence of the data linearised there.
     pub evidence: Evidence,
-    /// Steps that were made, and in how many of them a covariance was made anew.
+    /// Number of steps, and number of those with a new covariance.
     pub steps: [usize; 2],
     /// Largest change of the field in the last of them.
     pub change: f64,
 }
 
-/// Finds the most probable field from the coefficients `start` (H, epochs), zeros for no field. `linearise` makes all
-/// epochs linear around such coefficients, one column an epoch: always the same epochs in the same order. Where there
-/// is no model it gives numbers that are not finite.
+/// Finds the most probable field from the coefficients `start` (H, epochs), zeros for no field. `linearise` linearises
+/// all epochs around such coefficients, one column per epoch: always the same epochs in the same order. Where there is
+/// no model it gives numbers that are not finite.
 ///
-/// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
-/// left of the way is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
-/// (`tilt`) is found with each covariance that is made on the way, or is as nearby; in the evidence at the end it is
-/// that of the end, unless there is one nearby. ln Z depends on it to second order only, but one found far from the
-/// answer put ln Z of one star 2.6 too low.
+/// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. The
+/// remaining distance is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
+/// (`tilt`) is found with each new covariance, or taken from nearby; the evidence at the end uses that of the end,
+/// unless there is one nearby. ln Z depends on it to second order only, but a value found far from the solution made ln
+/// Z of one star 2.6 too low.
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
@@ -85,7 +85,7 @@ pub fn settle(
     settings: &Settling,
 ) -> Result<Settled, FieldError> {
     let Way { coefficients, epochs, last, steps, change } = approach(linearise, sought, start, nearby, settings)?;
-    // a reference has its own: neighbours begin from that
+    // a reference computes its own: neighbours begin from it
     let known = nearby.and_then(|nearby| last.as_ref().unwrap_or(nearby).explained());
     let explained = known.map(<[f64]>::to_vec);
     let seen = last.as_ref().or(nearby).and_then(Evidence::seen);
@@ -95,13 +95,13 @@ pub fn settle(
     Ok(Settled { coefficients, evidence, steps, change })
 }
 
-/// The way to the most probable field.
+/// The path to the most probable field.
 pub(crate) struct Way {
     /// Where it ends: coefficients of the field (H, epochs).
     pub coefficients: DMatrix<f64>,
     /// The epochs made linear there.
     epochs: Vec<Epoch>,
-    /// The last evidence that was made on it, beside its end; `None` if that nearby was enough.
+    /// The last evidence computed on it before the end; `None` if the nearby one was enough.
     pub last: Option<Evidence>,
     steps: [usize; 2],
     change: f64,
@@ -124,10 +124,10 @@ pub(crate) fn approach(
     let mut last: Option<Evidence> = None;
     let mut mixing = Mixing::default();
     let mut steps = [0; 2];
-    // a reference, from which others begin, is to be found more closely
+    // a reference, from which others begin, needs a closer solution
     let near = if nearby.is_some() { settings.longest } else { 0.5 * settings.longest };
     while steps[0] < settings.steps {
-        // steps by another covariance say nothing of those by this
+        // steps with another covariance do not predict those with this one
         let [before, _, change] = changes;
         let falls = change < near && change < FALLS * before && mixing.steps < FROZEN;
         let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || falls) {
@@ -194,7 +194,7 @@ struct Mixing {
 }
 
 impl Mixing {
-    /// The way from `place` by a step and by what those before tell of where it leads.
+    /// The change from `place`: a step, extrapolated by the steps before.
     fn mixed(&mut self, place: &DMatrix<f64>, step: DMatrix<f64>) -> DMatrix<f64> {
         self.steps += 1;
         if let Some([place_before, step_before]) = self.last.take() {

@@ -1,21 +1,21 @@
-//! How much of the field each degree of its spherical harmonics holds (`docs/method.md` section 9):
-//! `S_l = amplitude^2 [b(b+1) + l(l+1)]^-slope / norm` with a break at degree b, the norm such that the variances of
-//! all coefficients sum to amplitude^2.
+//! Variance of the field by degree of its spherical harmonics (`docs/method.md` section 9): `S_l = amplitude^2 [b(b+1)
+//! + l(l+1)]^-slope / norm` with a turnover at degree b, the norm such that the variances of all coefficients sum to
+//! amplitude^2.
 //!
 //! With harmonics of unit mean square that sum is the variance of the field, the same at every point of the sphere.
 
 use serde::{Deserialize, Serialize};
 
-/// A power law in degree, flat below a break: what lies apart by more than the size of the largest spots has nothing to
-/// do with each other.
+/// A power law in degree, flat below a turnover: points farther apart than the size of the largest spots are
+/// uncorrelated.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spectrum {
     /// Standard deviation of the field at any point.
     pub amplitude: f64,
-    /// Minus the exponent: small for a field that is rough.
+    /// Power-law index (minus the exponent): small for a rough field.
     pub slope: f64,
-    /// Degree of the break; 0 for a power law all the way.
+    /// Turnover degree; 0 for a pure power law.
     pub break_degree: f64,
 }
 
@@ -24,7 +24,7 @@ pub struct Spectrum {
 pub struct Degrees {
     /// Of each.
     pub of_each: Vec<usize>,
-    /// Of each that is not among them, for no data see it, but has its share in the variance of the field.
+    /// Of coefficients that no data constrain but that contribute to the variance of the field.
     pub unseen: Vec<usize>,
 }
 
@@ -53,7 +53,8 @@ impl Spectrum {
         seen.into_iter().map(|share| self.amplitude * self.amplitude * share).collect()
     }
 
-    /// Derivative of the logarithm of each variance with respect to the slope; with respect to ln amplitude it is 2.
+    /// Derivative of the logarithm of each variance with respect to the power-law index; with respect to ln amplitude
+    /// it is 2.
     pub fn log_variances_by_slope(&self, degrees: &Degrees) -> Vec<f64> {
         let [seen, unseen] = self.shares(degrees);
         let along = |shares: &[f64], of: &[usize]| -> f64 {
@@ -63,7 +64,7 @@ impl Spectrum {
         degrees.of_each.iter().map(|l| mean - self.log_size(*l)).collect()
     }
 
-    /// Shares in the field's variance of the coefficients and of those that no data see; they sum to 1.
+    /// Shares in the field's variance of the coefficients and of those that no data constrain; they sum to 1.
     fn shares(&self, degrees: &Degrees) -> [Vec<f64>; 2] {
         let weight = |l: &usize| (-self.slope * self.log_size(*l)).exp();
         let weights = [&degrees.of_each, &degrees.unseen].map(|of| of.iter().map(weight).collect::<Vec<f64>>());
@@ -99,7 +100,7 @@ mod tests {
         }
     }
 
-    /// Coefficients that no data see leave the variances of the others, and their slopes, as they are.
+    /// Coefficients that no data constrain do not change the variances of the others, nor their derivatives.
     #[test]
     fn what_is_unseen_has_its_share() {
         let spectrum = Spectrum { amplitude: 0.3, slope: 0.75, break_degree: 4.0 };

@@ -1,13 +1,12 @@
-//! Where ln Z is expanded (`docs/method.md` section 9): not at the most probable field, but where it is most probable
-//! with the volume counted of all fields that explain the data.
+//! Where ln Z is expanded (`docs/method.md` section 9): not at the most probable field, but at the maximum including
+//! the volume of all fields that explain the data.
 //!
-//! A model `(b - L c) / s(c)` that is divided by what depends on the field itself has a Jacobian in proportion to
-//! 1 / s, so that the fields that explain n numbers of an epoch as well fill a volume in proportion to `s^n`. Around
-//! the most probable field Laplace's approximation leaves that out, and finds ln Z of spots at S/N 1000 by some 10 too
-//! small. `s^n` as a factor of the integrand moves the place of the expansion to where the marginal of s is largest;
-//! its value there is taken out of the integral again. To first order that is a tilt `exp(-a^T c)`, `a = -n d ln s /
-//! dc` in every epoch, and a Gaussian field with a tilt is one of another mean, `-K a`; to second order it is one more
-//! number that was measured.
+//! A model `(b - L c) / s(c)` whose divisor depends on the field has a Jacobian in proportion to 1 / s, so that the
+//! fields that explain n numbers of an epoch as well fill a volume in proportion to `s^n`. Around the most probable
+//! field Laplace's approximation leaves that out, and finds ln Z of spots at S/N 1000 by some 10 too small. `s^n` as a
+//! factor of the integrand moves the place of the expansion to where the marginal of s is largest; its value there is
+//! removed from the integral again. To first order that is a tilt `exp(-a^T c)`, `a = -n d ln s / dc` in every epoch,
+//! and a Gaussian field with a tilt is one of another mean, `-K a`; to second order it is one more measured number.
 
 use super::compress::Compressed;
 use super::dense::{inverses, scale_rows};
@@ -22,7 +21,7 @@ pub struct Tilt {
     pub explained: Vec<f64>,
     /// a (H, epochs).
     by: DMatrix<f64>,
-    /// Which epochs are divided by anything.
+    /// Which epochs are divided by a continuum.
     divided: Vec<usize>,
 }
 
@@ -34,19 +33,19 @@ impl Tilt {
         Tilt { explained, by, divided }
     }
 
-    /// Where the numbers of the volume stand.
+    /// Positions of the numbers of the volume.
     pub fn places(&self, numbers: &Numbers) -> Vec<usize> {
         self.divided.iter().map(|k| numbers.parts[*k].end - 1).collect()
     }
 
-    /// Whether any model is divided by anything.
+    /// Whether any model is divided by a continuum.
     pub fn is_needed(epochs: &[Epoch]) -> bool {
         epochs.iter().any(|epoch| !epoch.divisor.is_empty())
     }
 
-    /// Counts the volume in what epochs around these coefficients (H, epochs) were compressed to, and in their numbers
-    /// and `spatial` part: the mean of the field, whose coefficients have these standard deviations, falls by `K a`,
-    /// and the last number of each epoch that is divided by anything is the volume.
+    /// Includes the volume in the numbers to which epochs around these coefficients (H, epochs) were compressed, and in
+    /// their rows and `spatial` part: the mean of the field, whose coefficients have these standard deviations, falls
+    /// by `K a`, and the last number of each epoch that is divided by a continuum is the volume.
     pub fn count(
         &self,
         (field, sd): (&Field, &[f64]),
@@ -63,7 +62,7 @@ impl Tilt {
             // 1/2 a^T K a + a^T c0
             of.constant += 0.5 * a.dot(&lowered.column(k)) + a.dot(&around);
             if !epoch.divisor.is_empty() {
-                // n ln s to second order: a number, measured to be what it is
+                // n ln s to second order: one number, with its own value as the measurement
                 let mut row = &epoch.divisor * self.explained[k].sqrt();
                 let last = of.expected.len() - 1;
                 of.expected[last] = row.dot(&around);

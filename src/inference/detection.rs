@@ -1,13 +1,13 @@
-//! The blind search for a planet: from the image of the star without one to the periodogram, and from its best orbit to
-//! the orbit that stays the best when the star is imaged with it.
+//! The blind search for a planet: from the image of the star without a planet to the periodogram, and from its best
+//! orbit to the self-consistent orbit when the star is imaged with it.
 //!
 //! The periodogram and its false-alarm probability belong to the expansion around the planet-free image: a statistic
-//! that knows nothing of the planet. That expansion is exact for small velocities only, so the best orbit is found
-//! again in an expansion around the image that it implies, and so on until K stays. A second planet is searched for in
-//! the last expansion, where the first is small.
+//! independent of the planet. That expansion is exact for small velocities only, so the best orbit is re-determined in
+//! an expansion around the image made with it, and so on until K converges. A second planet is searched for in the last
+//! expansion, where the first is small.
 //!
-//! Planets of known ephemeris belong to the star: all is searched beside them, their K left free. Where the first
-//! planet of a config is one of them, the best orbit is its own.
+//! Planets of known ephemeris belong to the star: every search includes them with K free. Where the first planet of a
+//! config is one of them, the best orbit is its own.
 
 mod known;
 mod remarks;
@@ -38,22 +38,22 @@ use crate::surface::{
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// Expansions around the best orbit at most.
+/// Largest number of expansions around the best orbit.
 const MOST_ROUNDS: usize = 6;
 
-/// K stays when it moves by less than this part of its error.
+/// K has converged when it moves by less than this fraction of its standard error.
 const STAYS: f64 = 0.01;
 
 /// What to search for, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DetectionSettings {
-    /// What is assumed of the spots.
+    /// The prior of the spots.
     pub surface: SurfaceSettings,
-    /// Parameters that are integrated out within their priors; the others are fixed.
+    /// Parameters that are marginalised over within their priors; the others are fixed.
     pub nuisances: Vec<Nuisance>,
     /// Planets whose periods and conjunctions are known.
     pub known: Vec<Ephemeris>,
-    /// How peaks are judged.
+    /// Settings of the false-alarm probability.
     pub search: SearchSettings,
     /// Whether eccentric orbits are fitted.
     pub eccentric: bool,
@@ -81,7 +81,7 @@ impl DetectionSettings {
 /// The second planet.
 #[derive(Clone, Debug)]
 pub struct SecondPlanet {
-    /// The search with the first orbit left free at its period.
+    /// The search with the first orbit free at its period.
     pub search: Search,
     /// Both orbits together; `None` where they have no maximum.
     pub both: Option<TwoOrbits>,
@@ -92,7 +92,7 @@ pub struct SecondPlanet {
 pub struct Detection {
     /// The trial periods.
     pub frequencies: Frequencies,
-    /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
+    /// Whether the spots evolve, where a static map is assumed and this was tested.
     pub change: Option<Result<Change, NoFit>>,
     /// Another rotation period with which the profiles are far more probable.
     pub other_rotation: Option<OtherRotation>,
@@ -100,49 +100,49 @@ pub struct Detection {
     pub known: KnownPlanets,
     /// The likelihood of the velocities of the star without these; `None` where there are none.
     alone: Option<Alone>,
-    /// Without a planet but those.
+    /// The star with only those planets.
     pub planet_free: Linearised,
-    /// The same without its jitter, where the profiles say how large that is: what `blind` is of.
+    /// The same without its jitter, where the jitter is fitted: the star of `blind`.
     pub without_jitter: Option<WithoutJitter>,
-    /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
-    /// which makes the false-alarm probability a cautious one.
+    /// The blind search there, on which the verdict is based. The planet itself contributes to the unresolved-spot
+    /// noise, which makes the false-alarm probability conservative.
     pub blind: Search,
     /// At the best orbit; `None` if it was not imaged, because its period lies on the edge of the search.
     pub at_best: Option<Linearised>,
-    /// Expansions that it took to get there.
+    /// Number of expansions.
     pub rounds: usize,
-    /// Whether K stays.
+    /// Whether K has converged.
     pub closed: bool,
     /// The best orbit, in the last expansion.
     pub best: Peak,
-    /// Keplerian orbits around each peak of the search, if asked for: the first in the last expansion.
+    /// Keplerian orbits around each peak of the search, if requested: the first in the last expansion.
     pub keplerian: Vec<Option<KeplerianOrbit>>,
-    /// The second planet, if asked for.
+    /// The second planet, if requested.
     pub second: Option<SecondPlanet>,
-    /// A constant velocity left free beside the orbit, without a planet in the image.
+    /// A constant velocity fitted with the orbit, without a planet in the image.
     pub offset: Option<Offset>,
     /// sigma_K at Porb = Prot over its median away from it, without a planet.
     pub co_rotation_penalty: Option<f64>,
 }
 
-/// What is under way.
+/// The step in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// The planet-free image and its expansion.
     PlanetFree,
     /// The same with the planets of known ephemeris.
     Known,
-    /// Whether the star changes.
+    /// Whether the spots evolve.
     Change,
     /// Periods, draws.
     Search,
-    /// The image at the best orbit, for that many times.
+    /// The image at the best orbit, with the count of images so far.
     BestOrbit(usize),
     /// The second planet.
     SecondPlanet,
 }
 
-/// A search with the periods at which these spots imitate orbits.
+/// A search with the periods at which these spots mimic orbits.
 fn imitated(surface: &dyn SurfaceModel, search: Search) -> Search {
     if surface.imitates_at_fractions() { search } else { search.without_multiples() }
 }
@@ -153,32 +153,32 @@ fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
     trials.iter().filter_map(|trial| Some(trial.orbit?.delta_ln_l)).fold(0.0, f64::max)
 }
 
-/// The star as it is without the planets of known ephemeris.
+/// The star without the planets of known ephemeris.
 #[derive(Clone, Debug)]
 pub struct Alone {
     /// The likelihood of its velocities.
     jitters: Jitters,
-    /// The star without its jitter, where the profiles say how large that is.
+    /// The star without its jitter, where the jitter is fitted.
     without_jitter: Option<WithoutJitter>,
 }
 
 /// A star without a planet, and the blind search for one there.
 #[derive(Clone, Debug)]
 pub struct PlanetFree {
-    /// Planets of known ephemeris, which it has.
+    /// Its planets of known ephemeris.
     pub known: KnownPlanets,
     /// The likelihood of the velocities of the star without these; `None` where there are none.
     pub alone: Option<Alone>,
     /// The star.
     pub here: Linearised,
-    /// The same without its jitter, where the profiles say how large that is.
+    /// The same without its jitter, where the jitter is fitted.
     pub without_jitter: Option<WithoutJitter>,
     /// The search.
     pub blind: Search,
 }
 
 impl PlanetFree {
-    /// Of the star in `at`, whatever the orbit there.
+    /// The state of the star in `at`, ignoring the orbit there.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -207,7 +207,7 @@ impl PlanetFree {
         Ok(PlanetFree { alone: Some(Alone { jitters, without_jitter }), ..found })
     }
 
-    /// Of the star in `at`, without an orbit but those of `known` planets, that is linearised `here`.
+    /// The state of the star in `at`, linearised `here`, with only the orbits of `known` planets.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -228,7 +228,7 @@ impl PlanetFree {
 }
 
 impl Detection {
-    /// Searches the star in `imager`, all but the orbit as in `values`, at the given periods.
+    /// Searches the star in `imager`, with all parameters but the orbit from `values`, at the given periods.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -272,7 +272,7 @@ impl Detection {
             offset,
             co_rotation_penalty: None,
         };
-        // K of the known planets beside another that was found
+        // K of the known planets with the detected planet in the model
         if !found.known.planets.is_empty() && found.is_candidate() && found.known.companion.is_none() {
             let frequency = 1.0 / found.blind.best().porb_over_prot;
             found.known = found.known.with_companion(frequency, &found.planet_free.quadratic);
@@ -307,8 +307,8 @@ impl Detection {
         self.at_best.as_ref().unwrap_or(&self.planet_free)
     }
 
-    /// The velocities that profiles have in common, beside the best orbit and those of known planets; `None` where they
-    /// are not bounded.
+    /// The RV offsets common to profiles, fitted with the best orbit and those of known planets; `None` where they are
+    /// not bounded.
     pub fn constants(&self, imager: &Imager, nuisances: &[Nuisance]) -> Option<Constants> {
         let here = self.last();
         let best = Some(&self.best).filter(|_| self.known.first().is_none());
@@ -338,30 +338,30 @@ impl Detection {
         regularised.log_likelihood(&self.best_velocities(&regularised.cycles))
     }
 
-    /// What is to be said where the star changes and is taken for one that does not.
+    /// The remark where the spots evolve but a static map is assumed.
     pub fn changes(&self) -> Option<String> {
         let Some(Ok(change)) = &self.change else { return None };
         change.is_changing().then(|| change.sentence())
     }
 
-    /// Why no planet can be judged, whatever the search shows: the star is not as it is taken to be.
+    /// Why no verdict is possible, whatever the search shows: the stellar model is invalid.
     pub fn not_judged(&self) -> Option<String> {
         let of_bound = self.planet_free.field.as_ref().and_then(SpotField::absorbs);
         let other = self.other_rotation.as_ref().filter(|other| other.is_far());
         self.changes().or(other.map(OtherRotation::sentence)).or(of_bound)
     }
 
-    /// The number that verdicts rest on: how often stars without a planet show as high a peak in the blind search.
+    /// The false-alarm probability of the blind search, on which verdicts are based.
     pub fn false_alarm_probability(&self) -> f64 {
         self.blind.false_alarm.probability(self.blind.best().orbit.delta_ln_l).value()
     }
 
-    /// Whether that is rare enough for a candidate.
+    /// Whether it is low enough for a candidate.
     pub fn is_candidate(&self) -> bool {
         self.false_alarm_probability() < CANDIDATE_FAP
     }
 
-    /// Linearises the star with the best orbit until that orbit stays.
+    /// Linearises the star with the best orbit until that orbit converges.
     fn close(&mut self, surface: &dyn SurfaceModel, mut at: At, report: &dyn Fn(Stage)) -> Result<(), SurfaceError> {
         let mut held = None;
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
@@ -370,7 +370,7 @@ impl Detection {
             at.values.set(Parameter::K, self.best.orbit.k_kms);
             at.values.set(Parameter::PorbOverProt, self.best.porb_over_prot);
             at.values.set(Parameter::Phi, self.best.orbit.phi);
-            // beside offsets between data sets, held where it is wrong, it would be taken for jitter
+            // with offsets between data sets fixed at wrong values, it would be absorbed by the jitter
             let constants = (!at.imager.zero_points.is_empty()).then(|| self.constants(at.imager, at.nuisances));
             if let Some(vsys) = constants.flatten().and_then(|constants| constants.systemic) {
                 at.values.set(Parameter::Vsys, vsys.value_kms);
@@ -382,11 +382,11 @@ impl Detection {
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
             self.best = next;
-            // the spots with a planet in the model are others; what moves after that is too little to matter
+            // spots differ with a planet in the model; later changes are negligible
             held = Some(surface.holding(&here));
             self.at_best = Some(here);
         }
-        // whatever the spots beside it, one height: that which is held against stars without a planet
+        // one height whatever the spots: the one compared with stars without a planet
         self.best.orbit.delta_ln_l = self.blind.best().orbit.delta_ln_l;
         Ok(())
     }
@@ -398,8 +398,8 @@ impl Detection {
         all.map(|(there, peak)| keplerian(&self.known.beside(&there.quadratic), &self.frequencies, peak)).collect()
     }
 
-    /// A search with the highest peak taken out, beside the jitter found with it and RV offsets of nights as the search
-    /// for the first planet is; `None` where that leaves nothing.
+    /// A search with the highest peak removed, with the jitter found with it and nightly RV offsets as in the search
+    /// for the first planet; `None` where no velocities remain.
     fn second_planet(
         &self,
         surface: &dyn SurfaceModel,

@@ -1,4 +1,4 @@
-//! The evidence for planets under the priors of a config: what is said of it beside a blind search.
+//! The evidence for planets under the priors of a config: reported with a blind search.
 
 use crate::model::{Clock, Elements, FreeParameter, Parameter, Prior, period_prior};
 use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrior, evidence};
@@ -8,29 +8,29 @@ use crate::planets::speeds::Speeds;
 use crate::planets::verdict::{decimals, probability, speed};
 use serde::{Deserialize, Serialize};
 
-/// A prior of K that reaches so many times farther than the error of K is said to be wide.
+/// A prior of K counts as wide if it reaches this many times farther than the standard error of K.
 const WIDE: f64 = 100.0;
 
-/// Standard deviations of a normal prior that are followed.
+/// A normal prior is cut at this many standard deviations.
 const FOLLOWED: f64 = 8.0;
 
-/// Where the prior of a period holds 0 it is followed from this share of the longest.
+/// A prior of the period that includes 0 is cut at this fraction of the longest.
 const SHORTEST: f64 = 0.01;
 
-/// What profiles say of no, one and two planets, of the star's spots as they are fitted without a planet.
+/// Evidence for no, one and two planets, with spots as fitted without a planet.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EvidenceRecord {
-    /// ln of the Bayes factor of one planet on a circle over none.
+    /// ln of the Bayes factor of one planet on a circular orbit relative to none.
     pub circle: LnBayes,
-    /// The same on an ellipse.
+    /// The same on a Keplerian orbit.
     pub ellipse: LnBayes,
-    /// The same of two planets on circles.
+    /// The same for two planets on circular orbits.
     pub two_circles: LnBayes,
     /// Intervals of frequency, one over the time base wide, of least false inclusion probability.
     pub inclusion: Vec<InclusionRecord>,
-    /// Priors that all of this is under, in words.
+    /// The priors, in words.
     pub priors: String,
-    /// All of it in a sentence.
+    /// A summary sentence.
     pub sentence: String,
 }
 
@@ -43,7 +43,7 @@ pub struct InclusionRecord {
     pub false_inclusion_probability: f64,
 }
 
-/// What is assumed of a planet.
+/// The priors of a planet.
 #[derive(Clone, Copy)]
 struct Assumed {
     k: (Prior, [f64; 2]),
@@ -52,12 +52,12 @@ struct Assumed {
 }
 
 impl EvidenceRecord {
-    /// Under the priors of `free` parameters, from the velocities of a star without a planet, beside `jitters`. `None`
-    /// where K or the period of the planet has no prior, or the profiles bound no orbit.
+    /// Under the priors of `free` parameters, from the velocities of a star without a planet, with `jitters`. `None`
+    /// where K or the period of the planet has no prior, or no orbit is bounded.
     pub fn of(free: &[FreeParameter], clock: Clock, seed: u64, jitters: &Jitters) -> Option<Self> {
         let [first, second] = &Elements::PLANETS;
         let one = Assumed::of(free, first, clock)?;
-        // of a second planet nothing else is assumed unless the config says so
+        // a second planet has the same priors unless the config gives others
         let two = Assumed::of(free, second, clock).unwrap_or(one);
         let found = one.with(|one| two.with(|two| evidence(jitters, [one, two], seed)))?;
         let error_kms = jitters.as_found().quadratic.information.trace().sqrt().recip() * 2f64.sqrt();
@@ -114,7 +114,7 @@ impl EvidenceRecord {
 impl Assumed {
     fn of(free: &[FreeParameter], of: &Elements, clock: Clock) -> Option<Self> {
         let prior = |p: Parameter| free.iter().find(|f| f.parameter == p).map(|f| f.prior);
-        // of a known ephemeris there is nothing to choose
+        // a known ephemeris has no choice of period
         prior(of.phi)?;
         let (k, period) = (prior(of.k)?, period_prior(free, of, clock)?);
         let largest_e = match prior(of.shape[0]) {
@@ -146,7 +146,7 @@ impl Assumed {
     }
 }
 
-/// The bounds of a prior, or where it is all but nothing.
+/// The bounds of a prior, or where it becomes negligible.
 fn followed(prior: &Prior) -> [f64; 2] {
     let (low, high) = prior.bounds();
     match *prior {

@@ -1,5 +1,5 @@
-//! What the data say of planet, star and spots, whatever the surface model: the blind search for a planet, the best
-//! parameters, and Bayes factors.
+//! Inference of planet, star and spots, whatever the surface model: the blind search for a planet, the best parameters,
+//! and Bayes factors.
 
 pub mod detection;
 pub mod evidence;

@@ -1,5 +1,5 @@
 //! The search for the best parameters: a blind search for the planet, where the surface model begins with one, and the
-//! model's own way up from there.
+//! model's own optimiser from there.
 
 use crate::inference::detection::{Detection, DetectionSettings};
 use crate::model::{Elements, Parameter, ParameterSpace, ParameterValues, for_blind_search};
@@ -17,9 +17,9 @@ pub use crate::surface::optimum::{Attempt, Progress, SearchError, Stage};
 /// What to search for, and from where.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchSettings {
-    /// What is assumed of the spots.
+    /// The prior of the spots.
     pub surface: SurfaceSettings,
-    /// Most other orbits to start from, beside the config's values.
+    /// Largest number of other orbits to start from, beside the config's values.
     pub other_starts: usize,
     /// Seed of those that are drawn.
     pub seed: u64,
@@ -28,22 +28,22 @@ pub struct SearchSettings {
 }
 
 impl SearchSettings {
-    /// The usual search.
+    /// The default search.
     pub fn of(surface: SurfaceSettings, seed: u64) -> Self {
         SearchSettings { surface, other_starts: OTHER_STARTS, seed, other_rotation: None }
     }
 }
 
-/// Most orbits that a search starts from, beside the config's.
+/// Largest number of orbits that a search starts from, beside the config's.
 const OTHER_STARTS: usize = 4;
 
-/// A circle is a saddle of the square roots of eccentricities: a climb begins beside it.
+/// A circular orbit is a saddle point in the square roots of eccentricities: optimisers begin beside it.
 const SMALLEST_E: f64 = 0.01;
 
-/// Share of the largest eccentricity that a climb begins within.
+/// Share of the largest eccentricity within which an optimiser begins.
 const SMALL_PART: f64 = 0.8;
 
-/// A maximum this much lower in log-probability holds a thousandth of the weight of the best, and is no rival.
+/// A maximum this much lower in log-probability has a thousandth of the weight of the best, and is ignored.
 const RIVAL_DROP: f64 = 7.0;
 
 /// The result of a search.
@@ -51,12 +51,12 @@ const RIVAL_DROP: f64 = 7.0;
 pub struct Found {
     /// The posterior relative to the reference at the optimum.
     pub posterior: Density,
-    /// The optimum of the objective asked for.
+    /// The optimum of the configured objective.
     pub optimum: Optimum,
     /// All starts.
     #[doc(hidden)]
     pub attempts: Vec<Attempt>,
-    /// The blind search that it began with, where it did.
+    /// The blind search at the start, if there was one.
     #[doc(hidden)]
     pub detection: Option<Box<Detection>>,
 }
@@ -104,7 +104,7 @@ pub fn find(
 /// A point in parameter space: the free parameters, and the values of all.
 type Point = (Vec<f64>, ParameterValues);
 
-/// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
+/// A blind search, where an orbit is sought; and the orbit that it finds, where the priors allow it.
 fn blind(
     imager: &Imager,
     space: &ParameterSpace,

@@ -4,17 +4,17 @@
 use crate::numerics::vector::Number;
 use crate::numerics::vector::linear::{axpy, combine, dot};
 
-/// When to stop, and what to do it with.
+/// Stopping criteria.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CgLimits {
     /// Residual over right-hand side, in the norm of the inverse, before the last step.
     pub tolerance: f64,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub iterations: usize,
 }
 
 /// Solves `A z = b` from the start `z`; returns the number of iterations. Once the residual is small enough one more
-/// step is taken, which costs no application of A, because its length is not computed but guessed.
+/// step is taken, which costs no application of A, because its length is estimated, not computed.
 ///
 /// The residual is measured against `b A^-1 b`: about `b z` where the start is good, about `b P b` where there is none.
 pub(super) fn solve<N: Number>(
@@ -40,12 +40,13 @@ pub(super) fn solve<N: Number>(
     }
     let goal = limits.tolerance * limits.tolerance * scale;
     let mut direction = preconditioned.clone();
-    // no longer than where the preconditioner is the inverse
+    // not longer than for an exact preconditioner
     let mut shortest = 1.0_f64;
     for iteration in 0..limits.iterations {
         if rho <= goal {
             if iteration > 0 && rho > 0.0 {
-                // a last step for nothing: its direction is known, and the shortest so far is hardly ever too long
+                // a last step at no cost: its direction is known, and the shortest length so far is hardly ever too
+                // long
                 axpy(shortest, &direction, z);
             }
             return iteration;
@@ -81,7 +82,7 @@ mod tests {
 
     #[test]
     fn the_last_step_for_nothing_is_worth_more_than_the_tolerance() {
-        // as a preconditioner leaves a system: eigenvalues from 1 to 2
+        // like a preconditioned system: eigenvalues from 1 to 2
         let eigenvalues: Vec<f64> = (0..100).map(|k| 1.0 + 0.01 * f64::from(k)).collect();
         let b: Vec<f64> = (0..100).map(|k| (0.7 * f64::from(k * k)).sin()).collect();
         let mut applications = 0;

@@ -1,10 +1,10 @@
-//! Where an image stands: what its gradient tells of the way that is left to the goal, without a Newton step.
+//! Convergence of an image: an estimate of its remaining error from the gradient, without a Newton step.
 //!
 //! With H the Newton system, g the gradient of chi2/2 and r minus the gradient of the merit, the path of solutions
-//! obeys `H path = -lambda g`, so that a step `H step = r` changes chi2 by `-2 path r / lambda`; and the adjoint of
-//! spottedness at fixed chi2 says that the step changes that by `adjoint r`. Path and adjoint of a solution near by
-//! serve as well, to first order in the distance. Where data say little, an adjoint is in proportion to the scale of
-//! the metric, and is kept relative to it: a pixel that has become spotted since then weighs what it weighs now.
+//! obeys `H path = -lambda g`, so that a step `H step = r` changes chi2 by `-2 path r / lambda`; and by the adjoint of
+//! spottedness at fixed chi2 the step changes spottedness by `adjoint r`. Path and adjoint of a nearby solution are
+//! accurate to first order in the distance. Where data constrain little, an adjoint is proportional to the scale of the
+//! metric, and is stored relative to it: a pixel that has become spotted since then has its present weight.
 
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
@@ -16,31 +16,32 @@ use crate::numerics::vector::{self, Instructions, Task};
 /// Largest change of ln(lambda) in one step.
 const LN_LAMBDA_CAP: f64 = 1.5;
 
-/// Bound of lambda: far beyond any use, it keeps a hopeless start finite.
+/// Bound of lambda: far beyond useful values, it keeps a bad start finite.
 pub(super) const SMALLEST_LAMBDA: f64 = 1e-12;
 
-/// A lambda this close to its bound, in logarithm, is there.
+/// A lambda this close to its bound, in logarithm, counts as at the bound.
 const AT_BOUND: f64 = 1e-12;
 
-/// Error of a first-order forecast of what spottedness has left to change, over the forecast: of a good one. Those of
-/// small changes are often worse, which is why errors come out several times the tolerance.
+/// Relative error of a first-order forecast of the remaining change of spottedness, for a good forecast. Forecasts of
+/// small changes are often worse, so that errors can be several times the tolerance.
 const FORECAST_ERROR: f64 = 0.03;
 
-/// Error of what a step along the path of a solution near by makes of chi2/2, over what that lacks.
+/// Relative error of the change of chi2/2 by a step along the path of a nearby solution.
 const PATH_ERROR: f64 = 0.01;
 
-/// Error left at the bound of lambda, over the forecast of what chi2/2 has left to change, which is not applied there.
+/// Remaining error at the bound of lambda, over the forecast of the remaining change of chi2/2, which is not applied
+/// there.
 const BOUND_ERROR: f64 = 0.3;
 
-/// Error of the forecast of spottedness, which is of second order in a step, over the merit of what the
-/// preconditioner's eigenvectors span of the step, ...
+/// Error of the forecast of spottedness, which is of second order in a step, over the merit of the part of the step
+/// spanned by the preconditioner's eigenvectors, ...
 const SPANNED_ERROR: f64 = 8.0;
 
-/// ... and over that of the rest: pixels that become spotted, where spottedness is far from linear. Like the constants
-/// above they were measured against exact solutions on the paper's setup, in three and seven dimensions.
+/// ... and over that of the rest: pixels that become spotted, where spottedness is far from linear. Like those above,
+/// these constants were measured against exact solutions on the paper's setup, in three and seven dimensions.
 const REST_ERROR: f64 = 40.0;
 
-/// An image with what has been computed there.
+/// An image with the quantities computed there.
 pub(super) struct Point {
     /// Coordinates of the image.
     pub u: Vec<f64>,
@@ -52,7 +53,7 @@ pub(super) struct Point {
     pub spottedness: f64,
 }
 
-/// What the gradient at a point says.
+/// Estimates from the gradient at a point.
 pub(super) struct Convergence {
     /// Scale of the entropy's metric.
     pub scale: Vec<f32>,
@@ -63,19 +64,19 @@ pub(super) struct Convergence {
     /// Slopes of chi2 and of spottedness along the path (0 without one).
     pub chi2_path: f64,
     pub spottedness_path: f64,
-    /// What spottedness has left to change at this chi2.
+    /// Forecast of the remaining change of spottedness at this chi2.
     pub spottedness_left: f64,
-    /// How far ln(lambda) has to move to the target (0 without a path).
+    /// Required change of ln(lambda) to reach the target (0 without a path).
     pub move_lambda: f64,
-    /// Of the error left all but what takes the preconditioner to tell.
+    /// Remaining error without the part that requires the preconditioner.
     known_error: f64,
-    /// Error from what the preconditioner's eigenvectors span, and from the rest, over the merit of each.
+    /// Error of the part spanned by the preconditioner's eigenvectors, and of the rest, over the merit of each.
     merit_errors: [f64; 2],
     /// Whether lambda is at its bound and chi2 stays above the target.
     pub at_bound: bool,
 }
 
-/// What is known of solutions near by.
+/// Quantities known from nearby solutions.
 #[derive(Clone, Copy)]
 pub(super) struct Guide<'a> {
     /// `dz / d ln(lambda)` in the metric; empty for unknown.
@@ -127,7 +128,7 @@ impl Convergence {
                 let weights = entropy.spottedness_gradient(&at.s, problem.area());
                 convergence.forecast(&weights, at, goal, guide);
             }
-            // without a path there is no telling how far chi2 is from its target
+            // without a path the distance of chi2 from its target is unknown
             Goal::Chi2 { .. } => convergence.known_error = f64::INFINITY,
         }
         convergence
@@ -148,7 +149,7 @@ impl Convergence {
             self.known_error = BOUND_ERROR * 0.5 * chi2_step.abs();
             return;
         }
-        // what is left of the way to the target where the move of lambda is cut short
+        // remaining distance to the target where the change of lambda is limited
         if let Goal::Chi2 { target, .. } = goal {
             self.known_error += 0.5 * (target - at.chi2 - chi2_step - chi2_path * move_lambda).abs();
             self.known_error += 0.5 * PATH_ERROR * (target - at.chi2).abs();
@@ -157,31 +158,31 @@ impl Convergence {
         self.known_error += 0.5 * (chi2_path * move_lambda * move_lambda).abs();
         if adjoint.len() == path.len() {
             let [of_step, of_chi2] = weighted_dots(adjoint, &self.scale, [&self.right, &self.chi2_gradient]);
-            // no component along the path: the move of lambda is accounted for by chi2
+            // no component along the path: the change of lambda is included in chi2
             self.spottedness_left = of_step + of_chi2 * at.lambda * chi2_step / chi2_path;
             self.known_error += FORECAST_ERROR * (self.spottedness_left * self.worth()).abs();
             self.merit_errors = [SPANNED_ERROR, REST_ERROR];
         }
     }
 
-    /// What the path changes of chi2, and what the Newton step at fixed lambda does.
+    /// Change of chi2 by the path, and by the Newton step at fixed lambda.
     fn slopes(&self, path: &[f32], at: &Point) -> (f64, f64) {
         (2.0 * dot(&self.chi2_gradient, path), -2.0 * dot(path, &self.right) / at.lambda)
     }
 
-    /// How far ln(lambda) has to move to the target by another path than that of the guide.
+    /// Required change of ln(lambda) to reach the target along another path than that of the guide.
     pub fn move_lambda_by(&self, path: &[f32], at: &Point, goal: Goal) -> f64 {
         let (chi2_path, chi2_step) = self.slopes(path, at);
         lambda_step(at, chi2_path, chi2_step, goal)
     }
 
-    /// Minus the gradient of the merit once ln(lambda) has moved so far, in the metric.
+    /// Minus the gradient of the merit after this change of ln(lambda), in the metric.
     pub fn right_after(&self, move_lambda: f64, at: &Point) -> Vec<f32> {
         let change = (move_lambda * at.lambda) as f32;
         combined(&self.right, &self.chi2_gradient, |right, g| right - change * g)
     }
 
-    /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be
+    /// Whether the estimated remaining error, in `S/lambda - chi2/2` or in the chi2/2 equivalent of spottedness, is
     /// below `tolerance`.
     pub fn is_within(
         &self,
@@ -192,13 +193,13 @@ impl Convergence {
         entropy: Entropy,
         area: &[f64],
     ) -> bool {
-        // for most of the way that is known without the preconditioner
+        // for most steps this is known without the preconditioner
         if self.known_error >= tolerance {
             return false;
         }
         let mut left = self.right_after(self.move_lambda, at);
         if matches!(goal, Goal::Chi2 { .. }) {
-            // a pixel at its bound that would go beyond stays where it is: no error that steps could make smaller
+            // a pixel held at its bound is not an error that steps could reduce
             let lowest = entropy.lowest_coordinate();
             combine(&mut left, &at.u, |left, u| if u <= lowest && left < 0.0 { 0.0 } else { left });
         }
@@ -208,14 +209,14 @@ impl Convergence {
         self.known_error + 0.5 * (of_spanned * (spanned + faint) + of_rest * rest) / at.lambda < tolerance
     }
 
-    /// What the squared norm of `left` lacks of twice the merit to be gained by pixels that are to come back to the
-    /// default. The metric knows changes of second order: next to nothing where a pixel has been pushed into the dark.
+    /// Difference between twice the merit to be gained by pixels that return to the default and the squared norm of
+    /// `left`. The metric is of second order, and negligible where a pixel has been pushed far into the dark.
     fn faint(&self, left: &[f32], at: &Point, entropy: Entropy, area: &[f64]) -> f64 {
         let (mut lacking, default) = (0.0, entropy.default_coordinate());
         for (((left, scale), area), u) in left.iter().zip(&self.scale).zip(area).zip(&at.u) {
             let (left, per_change) = (f64::from(*left), f64::from(*scale) * area);
             if left > per_change && *u < default {
-                // beyond the default it is for the data to say what a pixel gains
+                // beyond the default the gain of a pixel depends on the data
                 let change = (left / per_change).min(default - u);
                 lacking += (2.0 * area * entropy.gain(*u, change) - left * left).max(0.0);
             }
@@ -223,19 +224,19 @@ impl Convergence {
         lacking
     }
 
-    /// How much chi2/2 a spottedness is worth along the path (negative).
+    /// Change of chi2/2 per change of spottedness along the path (negative).
     fn worth(&self) -> f64 {
         0.5 * self.chi2_path / self.spottedness_path
     }
 
-    /// About how far the solution at hand is below `best` in log-likelihood.
+    /// Approximate log-likelihood of this solution below `best`.
     pub fn below(&self, best: &Best, at: &Point, goal: Goal) -> f64 {
         match goal {
             Goal::Lambda(lambda) => best.merit - (at.entropy / lambda - 0.5 * at.chi2),
             Goal::Chi2 { target, .. } => {
                 let misfit = 0.5 * (at.chi2 - target);
                 let more = at.spottedness - best.spottedness;
-                // along the path a misfit of chi2 is worth as much spottedness
+                // along the path a misfit of chi2 is equivalent to spottedness
                 misfit - more * self.worth()
             }
         }
@@ -272,7 +273,7 @@ impl Task for IntoMetric<'_> {
     }
 }
 
-/// How far to move ln(lambda) so that the linearised chi2 meets the target; 0 if chi2 is not the goal.
+/// Change of ln(lambda) for which the linearised chi2 meets the target; 0 if chi2 is not the goal.
 pub(super) fn lambda_step(at: &Point, chi2_path: f64, chi2_step: f64, goal: Goal) -> f64 {
     let Goal::Chi2 { target, largest_lambda } = goal else { return 0.0 };
     let wanted = if chi2_path < 0.0 {

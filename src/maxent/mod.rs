@@ -3,8 +3,8 @@
 //! In: a misfit with gradient and curvature ([`problem`]), the entropy of an image ([`entropy`]), a goal and a start
 //! ([`solution`]). Out: the image of greatest entropy at that chi2, or at that Lagrange multiplier.
 //!
-//! [`solver`] makes Newton steps; each is a linear system for `cg`, which [`preconditioner`] makes easy. `convergence`
-//! says how far the goal is, `parallelism` is Skilling & Bryan's own test.
+//! [`solver`] makes Newton steps; each is a linear system for `cg`, accelerated by [`preconditioner`]. `convergence`
+//! estimates the distance to the goal, `parallelism` is Skilling & Bryan's own test.
 
 mod cg;
 mod convergence;

@@ -17,7 +17,7 @@ pub fn parallelism(problem: &mut impl Problem, entropy: Entropy, coordinates: &[
     let mut misfit = vec![0.0; n];
     problem.linearise(&image);
     problem.gradient(&mut misfit);
-    // the gradient of -S, so that the sum is what vanishes
+    // the gradient of -S, so that the sum vanishes
     let product = |a: &[f64], b: &[f64]| -> f64 { (0..n).map(|p| a[p] * b[p] * f64::from(scale[p]).powi(2)).sum() };
     let (s, c) = (product(&towards_default, &towards_default).sqrt(), product(&misfit, &misfit).sqrt());
     (0..n).map(|p| (f64::from(scale[p]) * (towards_default[p] / s + misfit[p] / c)).powi(2)).sum::<f64>() / 2.0

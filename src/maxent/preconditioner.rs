@@ -2,8 +2,8 @@
 //! inverse of the Newton system of every nearby problem.
 //!
 //! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the
-//! number of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and
-//! lives on the pixels that carry it: the spotted part of the star.
+//! number of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and is
+//! restricted to pixels with significant entries: the spotted part of the star.
 
 mod rows;
 
@@ -15,7 +15,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rows::Rows;
 use std::ops::Range;
 
-/// `(1 + lambda M)^-1` of one map or of several, one after the other, that M does not mix.
+/// `(1 + lambda M)^-1` of one map or of several in sequence, which M does not mix.
 #[derive(Clone, Debug, Default)]
 pub struct Preconditioner {
     maps: Vec<Basis>,
@@ -28,32 +28,32 @@ struct Basis {
     pixels: usize,
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
-    /// The eigenvectors where most of them is, ...
+    /// The eigenvectors on pixels with most of their norm, ...
     spotted: Rows<i16>,
-    /// ... and on pixels that carry less than [`FAINT_ENERGY`] together: the time goes into fetching rows.
+    /// ... and on pixels that carry less than [`FAINT_ENERGY`] together: fetching rows takes most of the time.
     faint: Rows<i8>,
-    /// Of a component at most so much is subtracted: less than everything, because rounded eigenvectors are not quite
+    /// Largest fraction of a component that is subtracted: less than 1, because rounded eigenvectors are not quite
     /// orthonormal.
     most_subtracted: f64,
 }
 
-/// Of anything at most so much is subtracted: what is left must not drown in rounding, or the inverse is no longer
+/// Largest fraction that is subtracted in total: the remainder must exceed rounding errors, or the inverse is no longer
 /// positive.
 const MOST_SUBTRACTED: f64 = 1.0 - 1e-4;
 
-/// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
+/// Pixels are dropped, faintest first, as long as they carry less than this fraction of the basis.
 const DROPPED_ENERGY: f64 = 2e-3;
 
-/// So are others put among the faint ones, whose entries are rounded to 1/127 of the largest.
+/// The same for the faint pixels, whose entries are rounded to 1/127 of the largest.
 const FAINT_ENERGY: f64 = 0.1;
 
 /// Vectors beyond the wanted rank that the Krylov space has.
 const OVERSAMPLING: usize = 60;
 
-/// Vectors that the operator is applied to before it is applied to what came out.
+/// Vectors to which the operator is applied before it is applied to the results.
 const BLOCK: usize = 20;
 
-/// Projections that take the vectors so far out of the next ones: at most so many, ...
+/// Projections that orthogonalise the next vectors to those so far: at most this many, ...
 const MOST_PROJECTIONS: usize = 5;
 
 /// ... and no more once each of unit length keeps this much.
@@ -65,8 +65,8 @@ impl Preconditioner {
         Preconditioner::default()
     }
 
-    /// From the operator M (`apply(v, out)`) on vectors that hold so many `maps` of so many `pixels`: for each map at
-    /// most `rank` eigenvectors, those with eigenvalues above `smallest`. M is applied as often as for one map.
+    /// From the operator M (`apply(v, out)`) on vectors of `maps` times `pixels` entries: for each map at most `rank`
+    /// eigenvectors, those with eigenvalues above `smallest`. M is applied as often as for one map.
     pub fn build(
         maps: usize,
         pixels: usize,
@@ -78,7 +78,7 @@ impl Preconditioner {
         Preconditioner { maps: krylov(maps, pixels, rank + OVERSAMPLING, apply).into_iter().map(of_map).collect() }
     }
 
-    /// Bytes that it takes in memory, all but a few.
+    /// Approximate size in memory (bytes).
     pub fn bytes(&self) -> usize {
         self.maps.iter().map(|basis| basis.spotted.bytes() + basis.faint.bytes()).sum()
     }
@@ -91,7 +91,8 @@ impl Preconditioner {
         }
     }
 
-    /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
+    /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of the part of r spanned by the eigenvectors, and of the
+    /// rest.
     pub fn norms(&self, lambda: f64, r: &[f32]) -> (f64, f64) {
         if self.maps.is_empty() {
             return (0.0, dot(r, r));
@@ -100,7 +101,7 @@ impl Preconditioner {
         self.places().map(of_map).fold((0.0, 0.0), |sum, of| (sum.0 + of.0, sum.1 + of.1))
     }
 
-    /// Each map's, and where the map stands.
+    /// That of each map, with the range of the map.
     fn places(&self) -> impl Iterator<Item = (&Basis, Range<usize>)> {
         self.maps.iter().scan(0, |first, basis| {
             let map = *first..*first + basis.pixels;
@@ -131,7 +132,7 @@ impl Basis {
         Basis { pixels, eigenvalues, spotted, faint, most_subtracted }
     }
 
-    /// As [`Preconditioner::apply`], where `out` holds r already.
+    /// As [`Preconditioner::apply`], where `out` already contains r.
     fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
         let mut components = self.components(r);
         for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
@@ -156,8 +157,8 @@ impl Basis {
         components
     }
 
-    /// Subtracts a combination of the eigenvectors; in the order that has the last rows of the components, which are
-    /// still in the cache, first.
+    /// Subtracts a combination of the eigenvectors, beginning with the last rows of the components, which are still in
+    /// the cache.
     fn subtract<N: Number>(&self, components: &[f32], out: &mut [N]) {
         self.faint.subtract(components, out);
         self.spotted.subtract(components, out);
@@ -170,7 +171,7 @@ fn largest_eigenvalue(matrix: DMatrix<f64>) -> f64 {
     if is_one { matrix.symmetric_eigenvalues().max() } else { 0.0 }
 }
 
-/// An orthonormal basis of the block Krylov space of an operator, and what the operator makes of it.
+/// An orthonormal basis of the block Krylov space of an operator, and its image under the operator.
 struct Krylov {
     basis: DMatrix<f64>,
     image: DMatrix<f64>,
@@ -191,8 +192,8 @@ impl Krylov {
     }
 }
 
-/// The space of each map from a fixed random start, with about so many columns. The operator does not mix the maps, so
-/// that it is applied to a vector of each at once.
+/// The space of each map from a fixed random start, with about this many columns. The operator does not mix the maps,
+/// so that it is applied to a vector of each at once.
 fn krylov(maps: usize, pixels: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -> Vec<Krylov> {
     let width = BLOCK.min(pixels);
     let columns = width * columns.div_ceil(width).min(pixels / width);
@@ -205,8 +206,8 @@ fn krylov(maps: usize, pixels: usize, columns: usize, mut apply: impl FnMut(&[f6
     for first in (0..columns).step_by(width) {
         for (block, space) in blocks.iter_mut().zip(&mut spaces) {
             let known = space.basis.columns(0, first);
-            // until nothing of the known ones is left: what is nearly spanned by them is mostly rounding errors at
-            // first
+            // until no component along the known ones remains: vectors nearly spanned by them are mostly rounding
+            // errors at first
             for _ in 0..MOST_PROJECTIONS {
                 *block = std::mem::take(block).qr().q();
                 *block -= known * (known.transpose() * &*block);

@@ -1,22 +1,22 @@
-//! What an inversion needs to know of its data: a misfit, its gradient and its curvature, as functions of an image.
+//! The interface of data for an inversion: a misfit, its gradient and its curvature, as functions of an image.
 
 use crate::numerics::vector::Number;
 
 /// Which second derivative of the misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Curvature {
-    /// Of the misfit itself: Newton steps converge quadratically.
+    /// That of the misfit itself: Newton steps converge quadratically.
     Exact,
-    /// Of the misfit of the linearised model: never negative, however bad the fit.
+    /// That of the misfit of the linearised model: never negative, however bad the fit.
     GaussNewton,
 }
 
 /// A twice differentiable misfit `chi2(s)` of an image s.
 ///
-/// The methods refer to the image last given to [`Problem::linearise`]. Each call counts the applications of the
-/// response that it takes: one for `linearise` and `gradient`, two for `curvature`.
+/// The methods refer to the image last given to [`Problem::linearise`]. Each call counts its applications of the
+/// response: one for `linearise` and `gradient`, two for `curvature`.
 pub trait Problem {
-    /// Area of every pixel as a fraction of the whole; its length is that of every image.
+    /// Area of every pixel as a fraction of the whole; images have the same length.
     fn area(&self) -> &[f64];
 
     /// Moves to the image `s` and returns chi2.

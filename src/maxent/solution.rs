@@ -1,13 +1,13 @@
-//! What the solver is asked and what it answers: goal, precision, start, image, and why it stopped.
+//! Input and output of the solver: goal, precision, start, image, and why it stopped.
 
 use super::entropy::Entropy;
 
-/// What to solve for.
+/// The goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
     /// The image at this Lagrange multiplier.
     Lambda(f64),
-    /// The image at this chi2; where that takes more than `largest_lambda`, the image at that lambda.
+    /// The image at this chi2; where that requires more than `largest_lambda`, the image at that lambda.
     Chi2 {
         /// Target of chi2.
         target: f64,
@@ -19,19 +19,19 @@ pub enum Goal {
 /// Precision and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings {
-    /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal: by the
-    /// solver's estimate, which is no bound (`results/performance.md`: up to six times it over the bulk of a
+    /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 equivalent of spottedness where chi2 is the goal: by the
+    /// solver's estimate, which is not a bound (`results/performance.md`: up to six times that over the bulk of a
     /// posterior).
     pub tolerance: f64,
-    /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a
-    /// landscape shows it as a small part of its depth.
+    /// Additional error allowed far below the best solution, over the distance to it: it does not affect a chain, and
+    /// is a small fraction of the depth of a likelihood grid.
     pub leniency: f64,
-    /// Residual of the Newton systems over their right-hand side, before a last step that takes no pass; from 3e-3 on
-    /// they are solved in single precision, below in double precision for numbers that are in single precision.
+    /// Residual of the Newton systems over their right-hand side, before a last step without a pass; from 3e-3 on they
+    /// are solved in single precision, below in double precision with single-precision input.
     pub cg_tolerance: f64,
-    /// Most iterations of conjugate gradients for one Newton system.
+    /// Largest number of iterations of conjugate gradients for one Newton system.
     pub cg_iterations: usize,
-    /// Most Newton steps.
+    /// Largest number of Newton steps.
     pub newton_steps: usize,
 }
 
@@ -41,8 +41,8 @@ impl Default for SolverSettings {
     }
 }
 
-/// Solutions this far below the best, in units of log-likelihood, are granted half of [`SolverSettings::leniency`],
-/// those within a quarter of it next to nothing.
+/// Solutions this far below the best, in units of log-likelihood, are allowed half of [`SolverSettings::leniency`],
+/// those within a quarter of this almost nothing.
 const LENIENT_FROM: f64 = 40.0;
 
 impl SolverSettings {
@@ -52,12 +52,12 @@ impl SolverSettings {
         self.tolerance + self.leniency * drop.max(0.0) * far / (1.0 + far)
     }
 
-    /// As many iterations as it takes: for systems that the preconditioner is not made for.
+    /// Practically unlimited iterations: for systems that the preconditioner does not fit.
     pub fn patient() -> Self {
         SolverSettings { cg_iterations: 300, ..SolverSettings::default() }
     }
 
-    /// To rounding error rather than to what a chain needs: for references and tests.
+    /// To rounding error rather than to the precision of a chain: for references and tests.
     pub fn exact() -> Self {
         SolverSettings { tolerance: 1e-9, leniency: 0.0, cg_tolerance: 1e-3, ..SolverSettings::patient() }
     }
@@ -68,9 +68,9 @@ impl SolverSettings {
 pub enum Termination {
     /// The goal was met.
     Converged,
-    /// The target chi2 takes a lambda beyond the bound; the image is the one at the bound.
+    /// The target chi2 requires a lambda beyond the bound; the image is the one at the bound.
     Unreachable,
-    /// The number of Newton steps ran out.
+    /// The number of Newton steps is exhausted.
     StepLimit,
     /// A number that is not finite appeared.
     NonFinite,
@@ -79,7 +79,7 @@ pub enum Termination {
 /// An image where the solver starts or stops: coordinates of its pixels and the Lagrange multiplier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    /// Coordinate of every pixel, as its entropy has it.
+    /// Coordinate of every pixel, as defined by its entropy.
     pub coordinates: Vec<f64>,
     /// Lagrange multiplier of chi2/2.
     pub lambda: f64,
@@ -90,21 +90,19 @@ pub struct Image {
 pub struct Start {
     /// Image and lambda.
     pub image: Image,
-    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves model applications where it is good; empty
-    /// for none. With an adjoint it is taken for that of a solution near by, and not solved for again in the first
-    /// steps.
+    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves model applications if accurate; empty for
+    /// none. With an adjoint it counts as that of a nearby solution, and is not solved for again in the first steps.
     pub path: Vec<f32>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
-    /// The adjoint of spottedness at fixed chi2: how much of it a residual of the Newton system is worth. In the
-    /// entropy's metric, over the scale of the metric. Empty for none: then what is left of spottedness when the solver
-    /// stops is not forecast.
+    /// The adjoint of spottedness at fixed chi2: its change per residual of the Newton system. In the entropy's metric,
+    /// over the scale of the metric. Empty for none: then the remaining change of spottedness is not forecast.
     pub adjoint: Vec<f32>,
-    /// The best solution there is, so that effort is spared far below it; none to be precise everywhere.
+    /// The best known solution, to save effort far below it; none for full precision everywhere.
     pub best: Option<Best>,
 }
 
-/// The best solution of a family of problems: what others are compared with.
+/// The best solution of a family of problems: the reference for others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Best {
     /// Its spottedness.
@@ -137,17 +135,17 @@ pub struct Solution {
     pub chi2: f64,
     /// Entropy of the image.
     pub entropy: f64,
-    /// Spottedness, as its entropy has it.
+    /// Spottedness, as defined by its entropy.
     pub spottedness: f64,
-    /// First-order forecast of what spottedness has still to change at this chi2, from the start's adjoint.
+    /// First-order forecast of the remaining change of spottedness at this chi2, from the start's adjoint.
     pub spottedness_left: f64,
     /// `d chi2 / d ln(lambda)` along `path` (0 if the goal was a lambda).
     pub chi2_slope: f64,
     /// `d spottedness / d ln(lambda)` along `path` (0 if the goal was a lambda).
     pub spottedness_slope: f64,
     /// `dz / d ln(lambda)`: that of the start if it came with one and an adjoint, or if there was no step; else as last
-    /// computed, before the last step, in the entropy's metric there. Where `find_path` was asked, as it is at the
-    /// image. Of no meaning if the goal was a lambda.
+    /// computed, before the last step, in the entropy's metric there. After `find_path`, that at the image. Meaningless
+    /// if the goal was a lambda.
     pub path: Vec<f32>,
     /// Newton steps taken.
     pub newton_steps: usize,

@@ -2,10 +2,10 @@
 //! (`docs/method.md` section 2).
 //!
 //! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint
-//! says how far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to
-//! there. The path takes a solve of its own unless a solution near by has one. The steps end where a first-order
-//! forecast of what they would still change (`convergence`) is good enough. Every call starts from the image it is
-//! given and from nothing else, so the answer is a function of problem and start.
+//! gives the change of lambda, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to
+//! there. The path requires a second solve unless a nearby solution has one. The steps end where a first-order forecast
+//! of the remaining change (`convergence`) is small enough. Every call starts only from the given image, so the result
+//! is a function of problem and start.
 
 use super::cg::{self, CgLimits};
 use super::convergence::{Convergence, Guide, Point, SMALLEST_LAMBDA};
@@ -19,19 +19,19 @@ use crate::numerics::vector::linear::{combine, combine_two, dot, norm, rounded, 
 /// Largest change of a coordinate in one step.
 const STEP_CAP: f32 = 2.0;
 
-/// Largest change of ln(lambda) that is made before the first Newton step.
+/// Largest change of ln(lambda) before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
 
-/// Steps that take the path of a solution near by for granted; whoever needs more was not so near.
+/// Number of first steps that use the path of a nearby solution; problems that need more were not close to it.
 const KNOWN_PATH_STEPS: usize = 6;
 
-/// An error below this part of chi2 is rounding, and no step makes it smaller.
+/// An error below this fraction of chi2 is rounding, which no step reduces.
 const ROUNDING: f64 = 1.5e-12;
 
 /// Systems that are solved to this residual or a larger one are solved in single precision.
 const LOOSE: f64 = 3e-3;
 
-/// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
+/// The exact curvature is used once a step changes less than this in `S/lambda - chi2/2`.
 const EXACT_BELOW: f64 = 100.0;
 
 /// The solver: entropy, preconditioner and settings.
@@ -91,9 +91,8 @@ impl Solver<'_> {
             if newton_steps == self.settings.newton_steps {
                 return self.finish(at, Some(convergence), path, Termination::StepLimit, newton_steps);
             }
-            // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be;
-            // and that of a solution near by serves: lambda goes wrong by as much as the path, and the next step sees
-            // it
+            // at the bound of lambda there is no step along the path, whose last estimate is kept for later; and the
+            // path of a nearby solution is good enough: its error in lambda is corrected by the next step
             let near_by = !adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && convergence.chi2_path < 0.0;
             let mut move_lambda = convergence.move_lambda;
             if matches!(goal, Goal::Chi2 { .. }) && !convergence.at_bound && !near_by {
@@ -103,7 +102,8 @@ impl Solver<'_> {
             let newton = self.newton(problem, &at, &convergence, move_lambda, curvature);
             let decrement = newton.decrement;
             at = self.advance(problem, &at, &convergence.scale, newton);
-            // far away the curvature of the model may make the system indefinite, near by it makes the steps exact
+            // far from the solution the curvature of the model may make the system indefinite, close to it the steps
+            // become exact
             let near = 0.5 * decrement < EXACT_BELOW * at.lambda;
             curvature = if near { Curvature::Exact } else { Curvature::GaussNewton };
         }
@@ -125,7 +125,7 @@ impl Solver<'_> {
     }
 
     /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs
-    /// none, or as precise as this solver's systems are.
+    /// none, or to the precision of this solver's systems.
     pub fn find_path(&self, problem: &mut impl Problem, solution: &mut Solution) {
         let s = self.entropy.image(&solution.image.coordinates);
         let scale = self.entropy.metric(&s, problem.area());
@@ -146,7 +146,7 @@ impl Solver<'_> {
         stand(problem, u, s, lambda, worth)
     }
 
-    /// Arrives by the step `length * z` in the metric of `scale`.
+    /// Moves by the step `length * z` in the metric of `scale`.
     fn step(
         &self,
         problem: &mut impl Problem,
@@ -161,7 +161,7 @@ impl Solver<'_> {
         stand(problem, u, s, lambda, worth)
     }
 
-    /// Moves along the path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
+    /// Moves along the path to where chi2 meets the goal by its slope: one pass that saves a Newton step.
     fn restore(&self, problem: &mut impl Problem, at: Point, goal: Goal, path: &[f32], chi2_slope: f64) -> Point {
         let Goal::Chi2 { target, .. } = goal else { return at };
         let move_lambda = (target - at.chi2) / chi2_slope;
@@ -173,7 +173,7 @@ impl Solver<'_> {
         self.step(problem, &at, (path, &scale), move_lambda, at.lambda * move_lambda.exp())
     }
 
-    /// The path along lambda, from a guess of it or nothing.
+    /// The path along lambda, from a guess or from zero.
     fn solve_path(
         &self,
         problem: &mut impl Problem,
@@ -187,7 +187,7 @@ impl Solver<'_> {
         self.solve_system(problem, System { lambda: at.lambda, scale: &convergence.scale, curvature }, &mut pull, path);
     }
 
-    /// The Newton step to where lambda is to go.
+    /// The Newton step with the given change of lambda.
     fn newton(
         &self,
         problem: &mut impl Problem,
@@ -203,9 +203,9 @@ impl Solver<'_> {
         Newton { decrement: (norm * dot(&step, &right)).max(0.0), step, move_lambda }
     }
 
-    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, so that nothing is too small
-    /// or too large for single precision; returns how long it was. In double precision where it is to be precise, but
-    /// right-hand side and solution are in single precision even then, and the steps make up for it.
+    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, to stay within the range of
+    /// single precision; returns its former length. High precision uses double precision, but right-hand side and
+    /// solution are in single precision even then, which later steps correct.
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &mut [f32], z: &mut [f32]) -> f64 {
         let (norm, per_norm) = norm_of(right);
         scale_by(per_norm, right);
@@ -223,7 +223,7 @@ impl Solver<'_> {
         norm
     }
 
-    /// The same in the precision of its numbers.
+    /// The same in the precision of its arguments.
     fn solve_with<N: Number>(&self, problem: &mut impl Problem, system: System<N>, right: &[N], z: &mut [N]) {
         let System { lambda, scale, curvature } = system;
         let mut scaled = vec![N::default(); right.len()];
@@ -285,7 +285,7 @@ fn stand(problem: &mut impl Problem, u: Vec<f64>, s: Vec<f64>, lambda: f64, wort
     Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
 }
 
-/// The norm and its inverse, 0 for that of nothing.
+/// The norm and its inverse, 0 for the inverse of 0.
 fn norm_of<N: Number>(right: &[N]) -> (f64, f64) {
     let norm = norm(right);
     (norm, if norm == 0.0 { 0.0 } else { norm.recip() })

@@ -1,4 +1,4 @@
-//! Values by parameter: to read, to write, and in files.
+//! Values by parameter: reading, writing, and files.
 
 use super::parameters::{Parameter, Role};
 use super::values::ParameterValues;
@@ -33,7 +33,7 @@ impl ParameterValues {
         self.find(p).copied()
     }
 
-    /// Gives a parameter that value; with it a second planet, an eccentric orbit or a field is there.
+    /// Sets a parameter; this creates a second planet, an eccentric orbit or a field where needed.
     ///
     /// # Panics
     /// If it is a period in days or the time of a conjunction.
@@ -47,7 +47,7 @@ impl ParameterValues {
     }
 }
 
-/// An object of name and value of those that are given, in the order of [`Parameter::ALL`].
+/// An object of names and values of the given ones, in the order of [`Parameter::ALL`].
 impl Serialize for ParameterValues {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(Parameter::ALL.iter().filter_map(|&p| Some((p.name(), self.get(p)?))))
@@ -72,7 +72,7 @@ impl<'de> Deserialize<'de> for ParameterValues {
 mod tests {
     use super::*;
 
-    /// Every parameter has a place of its own, and is absent or given in files as in memory.
+    /// Every parameter has its own place, and is absent or present in files as in memory.
     #[test]
     fn what_is_set_is_read_again() {
         let bare = ParameterValues::of_eight([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);

@@ -1,8 +1,8 @@
 //! Free parameters, their joint prior, and the sampling coordinates that samplers and optimisers move in.
 //!
 //! Where K and phi of a planet are both free they become `(K cos, K sin)` of the mean longitude at mid-time
-//! (`docs/method.md` section 5): K near 0 and the wrap of phi are then no special case, and phi no longer hangs on the
-//! period, nor on the eccentricity. Eccentricity is `sqrt(e) cos(omega), sqrt(e) sin(omega)` as it is.
+//! (`docs/method.md` section 5): K near 0 and the wrap of phi are then no special cases, and the angle is uncorrelated
+//! with the period and the eccentricity. The coordinates of eccentricity stay `sqrt(e) cos(omega), sqrt(e) sin(omega)`.
 
 use super::elements::{Clock, Elements};
 use super::parameters::{Parameter, Step, turning};
@@ -14,7 +14,7 @@ use std::f64::consts::{PI, TAU};
 /// A free parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeParameter {
-    /// Which.
+    /// The parameter.
     pub parameter: Parameter,
     /// Its prior, in the units of its name.
     pub prior: Prior,
@@ -25,17 +25,17 @@ pub struct FreeParameter {
 pub struct ParameterSpace {
     /// The free parameters in the order of [`Parameter::ALL`].
     free: Vec<FreeParameter>,
-    /// Values of all; those of the free ones are where a search starts.
+    /// Values of all; those of the free ones are the start of a search.
     values: ParameterValues,
     names: Vec<String>,
     /// Rotation cycle in the middle of the time base, and its length.
     mid_cycle: f64,
     time_base_cycles: f64,
-    /// Rotation cycles of the longest season, each having a map of its own.
+    /// Rotation cycles of the longest season; seasons have separate maps.
     season_cycles: f64,
-    /// What ephemerides are counted with.
+    /// Rotation period and epoch for ephemerides.
     clock: Clock,
-    /// Mass of the star (solar masses), where it is known: two planets must be stable.
+    /// Mass of the star (solar masses), where known, for the stability of two planets.
     mass_msun: Option<f64>,
     /// Planets of which K and phi are free.
     polar: Vec<Polar>,
@@ -57,7 +57,7 @@ pub fn period_prior(free: &[FreeParameter], of: &Elements, clock: Clock) -> Opti
     prior(of.ratio).or_else(|| Some(prior(of.period)?.in_units_of(clock.rotation_period_d)))
 }
 
-/// Values for a blind search: circles, and none of a second planet that is looked for as well.
+/// Values for a blind search: circular orbits, and no second planet if one is sought as well.
 pub fn for_blind_search(mut values: ParameterValues, free: &[FreeParameter]) -> ParameterValues {
     values.first.shape = None;
     if free.iter().any(|f| Elements::of(f.parameter).is_some_and(|of| of.planet > 0)) {
@@ -66,11 +66,12 @@ pub fn for_blind_search(mut values: ParameterValues, free: &[FreeParameter]) -> 
     values
 }
 
-/// Smallest K (km/s) at which the Jacobian of the polar coordinates is told apart from that at K = 0.
+/// Smallest K (km/s) at which the Jacobian of the polar coordinates differs from that at K = 0.
 const SMALLEST_K_KMS: f64 = 1e-9;
 
 impl ParameterSpace {
-    /// Of the given free parameters, the rest fixed at `values`; times span `time_base_cycles` around `mid_cycle`.
+    /// The space of the given free parameters, the rest fixed at `values`; times span `time_base_cycles` around
+    /// `mid_cycle`.
     pub fn new(
         mut free: Vec<FreeParameter>,
         values: ParameterValues,
@@ -104,30 +105,30 @@ impl ParameterSpace {
     }
 
     /// The same with the time of rotation cycle 0 (d), from which conjunctions are counted, and the mass of the star
-    /// (solar masses), by which two planets are stable or not.
+    /// (solar masses), which decides on the stability of two planets.
     pub fn of_star(mut self, epoch_d: f64, mass_msun: Option<f64>) -> Self {
         self.clock.epoch_d = epoch_d;
         self.mass_msun = mass_msun;
         self
     }
 
-    /// The same where the longest season, each of which has a map of its own, is of so many rotation cycles.
+    /// The same with this length (rotation cycles) of the longest season; seasons have separate maps.
     pub fn of_seasons(self, season_cycles: f64) -> Self {
         ParameterSpace { season_cycles, ..self }
     }
 
-    /// What ephemerides are counted with.
+    /// Rotation period and epoch for ephemerides.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
-    /// The prior of a planet's period over the rotation period, whichever way the period is free; `None` where it is
-    /// fixed.
+    /// The prior of a planet's period over the rotation period, whichever parameter of the period is free; `None` where
+    /// it is fixed.
     pub fn period_prior(&self, of: &Elements) -> Option<Prior> {
         period_prior(&self.free, of, self.clock)
     }
 
-    /// Whether two planets can last beside each other; a single one always does.
+    /// Whether two planets are stable; a single one always is.
     ///
     /// # Errors
     /// [`Unstable`].
@@ -137,7 +138,7 @@ impl ParameterSpace {
         stability::check(&motion.first, &second, self.clock.rotation_period_d, self.mass_msun)
     }
 
-    /// The same with the field of `values` where it is fixed.
+    /// The same with the field of `values` where that is fixed.
     pub fn with_field_of(mut self, values: &ParameterValues) -> Self {
         let own = self.values;
         self.values.field = values.field;
@@ -191,7 +192,7 @@ impl ParameterSpace {
         self.theta_of(&self.values)
     }
 
-    /// Logarithm of the prior density at `theta`; minus infinity outside, and where two planets would not last.
+    /// Logarithm of the prior density at `theta`; minus infinity outside, and where two planets would be unstable.
     pub fn log_prior(&self, theta: &[f64]) -> f64 {
         let own = |(f, &x): (&FreeParameter, &f64)| match f.prior {
             Prior::Disc { .. } => 0.0,
@@ -236,7 +237,7 @@ impl ParameterSpace {
         self.free.iter().map(|f| f.prior == Prior::Periodic).collect()
     }
 
-    /// Mean longitude at mid-time (rad), but for phi, of a planet whose period and shape are in `theta`.
+    /// Mean longitude at mid-time (rad) without phi, of a planet whose period and shape are in `theta`.
     fn mid_angle(&self, of: &Elements, theta: &[f64]) -> f64 {
         let values = self.values_at(theta);
         TAU * self.mid_cycle / values[of.ratio] + TAU * of.shape(&values).longitude(0.0)
@@ -260,7 +261,7 @@ impl ParameterSpace {
             let (x, y) = (internal[k], internal[phi]);
             theta[k] = x.hypot(y);
             theta[phi] = (self.mid_angle(of, internal) - y.atan2(x)) / TAU;
-            // phi has period 1 whatever its prior: bring it to where that one may contain it
+            // phi has period 1 whatever its prior: shift it into the bounds of the prior
             let (lowest, _) = self.free[phi].prior.bounds();
             theta[phi] -= (theta[phi] - lowest.max(-1e6)).floor();
         }
@@ -276,8 +277,8 @@ impl ParameterSpace {
         self.polar.iter().fold(own, |sum, polar| sum - (TAU * theta[polar.k].max(SMALLEST_K_KMS)).ln())
     }
 
-    /// Bounds of the priors in sampling coordinates, infinite for those that make up velocities of an orbit; not so
-    /// near that rounding leads outside.
+    /// Bounds of the priors in sampling coordinates, infinite for those that form velocities of an orbit; with a margin
+    /// for rounding.
     pub fn sampling_bounds(&self) -> Vec<(f64, f64)> {
         const ROUNDING: f64 = 1e-12;
         let inside = |low: f64, high: f64| match ROUNDING * (high - low) {
@@ -299,8 +300,8 @@ impl ParameterSpace {
         bounds
     }
 
-    /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
-    /// numerical derivatives and a first trust region are scaled with.
+    /// Steps of the sampling coordinates over which profiles change by about a percent of their features: the scale of
+    /// numerical derivatives and of a first trust region.
     pub fn scales(&self) -> Vec<f64> {
         let season_d = self.season_cycles.max(0.1) * self.clock.rotation_period_d;
         let scale = |f: &FreeParameter| {

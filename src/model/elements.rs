@@ -1,8 +1,8 @@
-//! Which parameters belong to which planet, and the one place where an ephemeris in days becomes what is computed with.
+//! The parameters of each planet, and the conversion of ephemerides in days.
 //!
-//! A period in days stands for `Porb/Prot`, `P / rotation_period`; the time of an inferior conjunction for phi:
-//! `phi = (T - epoch) / P - (lambda_c - lambda_max)`, the mean longitudes (cycles) of conjunction and largest velocity,
-//! a quarter of a cycle apart on a circle.
+//! A period in days replaces `Porb/Prot`, `P / rotation_period`; the time of an inferior conjunction replaces phi: `phi
+//! = (T - epoch) / P - (lambda_c - lambda_max)`, the mean longitudes (cycles) of conjunction and largest velocity, a
+//! quarter of a cycle apart for a circular orbit.
 
 use super::parameters::{PARAMETERS, Parameter, Role};
 use super::prior::Prior;
@@ -14,7 +14,7 @@ use std::f64::consts::FRAC_PI_2;
 /// The parameters of one planet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Elements {
-    /// Which of the planets: 0 or 1.
+    /// Index of the planet: 0 or 1.
     pub planet: usize,
     /// Semi-amplitude.
     pub k: Parameter,
@@ -30,7 +30,7 @@ pub struct Elements {
     pub shape: [Parameter; 2],
 }
 
-/// What days are counted with.
+/// Rotation period and epoch for days.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Rotation period (d).
@@ -40,7 +40,7 @@ pub struct Clock {
 }
 
 impl Elements {
-    /// Of the planet and of a second one.
+    /// Those of the planet and of a second one.
     pub const PLANETS: [Elements; 2] = [Elements::of_planet(0), Elements::of_planet(1)];
 
     const fn of_planet(planet: usize) -> Self {
@@ -55,7 +55,7 @@ impl Elements {
         }
     }
 
-    /// Writes values of free parameters into `values`. An ephemeris becomes what it stands for here.
+    /// Writes values of free parameters into `values`. Ephemerides are converted here.
     pub fn write(values: &mut ParameterValues, given: impl Iterator<Item = (Parameter, f64)> + Clone, clock: Clock) {
         given.clone().filter(|(p, _)| !p.is_ephemeris()).for_each(|(p, x)| values.set(p, x));
         for (p, x) in given {
@@ -89,10 +89,10 @@ impl Elements {
         values.orbit(self.planet).and_then(|orbit| orbit.shape).unwrap_or_default()
     }
 
-    /// The orbit of a planet that is there.
+    /// The orbit of an existing planet.
     ///
     /// # Panics
-    /// If it is not.
+    /// If there is none.
     pub fn orbit(&self, values: &ParameterValues) -> Eccentric {
         values.orbit(self.planet).expect("a planet that is there").eccentric()
     }
@@ -102,7 +102,7 @@ impl Elements {
         values.set(self.ratio, period_d / clock.rotation_period_d);
     }
 
-    /// Writes the time of a conjunction into `values`, whose period and shape are there.
+    /// Writes the time of a conjunction into `values`, whose period and shape are set.
     pub fn set_conjunction(&self, values: &mut ParameterValues, time_d: f64, clock: Clock) {
         let cycles = (time_d - clock.epoch_d) / self.period_d(values, clock);
         values.set(self.phi, (cycles - to_conjunction(&self.shape(values))).rem_euclid(1.0));
@@ -121,8 +121,8 @@ impl Elements {
         clock.epoch_d + period * (turns + phase)
     }
 
-    /// The value of a parameter of one of the planets or of any other that has the given prior, if it is given; of a
-    /// conjunction the one nearest to the middle of the prior.
+    /// The value of any parameter with the given prior, if it is set; for a conjunction the one nearest to the middle
+    /// of the prior.
     pub fn value(parameter: Parameter, prior: &Prior, values: &ParameterValues, clock: Clock) -> Option<f64> {
         match parameter.spec().role {
             Role::Orbit(planet, element @ (Element::Period | Element::Conjunction)) => {
@@ -138,7 +138,7 @@ impl Elements {
     }
 }
 
-/// The parameter that is this number of a planet's orbit.
+/// The parameter for this element of a planet's orbit.
 const fn parameter(planet: usize, element: Element) -> Parameter {
     let mut i = 0;
     while i < PARAMETERS.len() {

@@ -1,4 +1,4 @@
-//! Planets whose ephemeris is known: a period and the time of a conjunction, each with its error or fixed.
+//! Planets whose ephemeris is known: a period and the time of a conjunction, each with its uncertainty or fixed.
 
 use super::{Clock, Element, Elements, FreeParameter, Parameter, ParameterValues, Prior, period_prior};
 use crate::star::Shape;
@@ -8,20 +8,20 @@ use serde::{Deserialize, Serialize};
 /// A known ephemeris.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ephemeris {
-    /// Of which of the planets: 0 or 1.
+    /// Index of the planet: 0 or 1.
     pub planet: usize,
     /// Time of a conjunction (d) and its standard error.
     pub conjunction_d: [f64; 2],
     /// Period (d) and its standard error.
     pub period_d: [f64; 2],
-    /// Shape of the orbit; a circle where it is not given, or free.
+    /// Shape of the orbit; circular where it is not given, or free.
     pub shape: Option<Shape>,
-    /// What days are counted with.
+    /// Rotation period and epoch for days.
     pub clock: Clock,
 }
 
 impl Ephemeris {
-    /// Those of the planets whose conjunction has a normal prior, and whose period has one or is fixed at that of
+    /// The ephemerides of planets whose conjunction has a normal prior, and whose period has one or is fixed at that of
     /// `values`.
     pub fn all(free: &[FreeParameter], values: &ParameterValues, clock: Clock) -> Vec<Self> {
         Elements::PLANETS.iter().filter_map(|of| Ephemeris::new(of, free, values, clock)).collect()
@@ -52,7 +52,7 @@ impl Ephemeris {
         conjunction_sd.hypot((time_d - conjunction) / period * period_sd) / period
     }
 
-    /// Writes the orbit of semi-amplitude `k_kms` into `values`, at the ephemeris as given.
+    /// Writes the orbit of semi-amplitude `k_kms` into `values`, at the given ephemeris.
     pub fn write(&self, k_kms: f64, values: &mut ParameterValues) {
         self.write_at(self.period_d[0], self.conjunction_d[0], values);
         values.set(self.of().k, k_kms);
@@ -64,7 +64,7 @@ impl Ephemeris {
         self.of().set_conjunction(values, conjunction_d, self.clock);
     }
 
-    /// Velocities (km/s) of an orbit of K = 1 km/s at the ephemeris as given, at rotation `cycles`.
+    /// Velocities (km/s) of an orbit of K = 1 km/s at the given ephemeris, at rotation `cycles`.
     pub fn unit_velocities(&self, cycles: &[f64]) -> DVector<f64> {
         self.unit_velocities_at(self.period_d[0], self.conjunction_d[0], cycles)
     }

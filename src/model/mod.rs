@@ -1,8 +1,9 @@
 //! The parameters of a star, its planets and its spots (`docs/method.md` sections 1 and 5).
 //!
-//! [`parameters`] is their table, where a new one begins, [`values`] what they are of one star, [`prior`] their priors.
-//! [`coordinates`] turns the free ones into the coordinates that samplers move in, [`elements`] ephemerides in days
-//! into phases and periods. [`orbital`] has what is quoted of an orbit, `quoted` the same for draws of a chain.
+//! [`parameters`] is their table, where a new one is added, [`values`] their values for one star, [`prior`] their
+//! priors. [`coordinates`] turns the free ones into the coordinates that samplers move in, [`elements`] ephemerides in
+//! days into phases and periods. [`orbital`] has the quoted quantities of an orbit, `quoted` the same for draws of a
+//! chain.
 
 mod access;
 pub mod coordinates;

@@ -1,5 +1,6 @@
-//! What is usually quoted of an orbit: period in days, time of the largest radial velocity and of inferior conjunction,
-//! minimum mass, eccentricity; for single orbits, of circles with their errors. For each draw of a chain see `quoted`.
+//! Usually quoted quantities of an orbit: period in days, time of the largest radial velocity and of inferior
+//! conjunction, minimum mass, eccentricity; for single orbits, with uncertainties for circular ones. For each draw of a
+//! chain see `quoted`.
 //!
 //! Formulas are in `star::planet`.
 
@@ -10,7 +11,7 @@ use crate::star::planet::{maximum_phase, minimum_mass};
 use crate::star::{Eccentric, Orbit, StarSettings};
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation of a phase of which nothing is known (cycles).
+/// Standard deviation of a uniform phase (cycles).
 pub(super) const UNKNOWN_PHASE: f64 = 0.288_675_134_594_812_9;
 
 /// Minimum masses below this (Jupiter masses) are also given in masses of the Earth.
@@ -34,7 +35,7 @@ pub enum OrbitQuantity {
 }
 
 impl OrbitQuantity {
-    /// Those of a circle, in order.
+    /// Those of a circular orbit, in order.
     pub const ALL: [OrbitQuantity; 4] =
         [OrbitQuantity::Period, OrbitQuantity::Maximum, OrbitQuantity::Conjunction, OrbitQuantity::MinimumMass];
 
@@ -50,7 +51,7 @@ impl OrbitQuantity {
         }
     }
 
-    /// Whether it is the time of something that comes back with every orbit.
+    /// Whether it is the time of an event that recurs with every orbit.
     pub fn is_event(self) -> bool {
         matches!(self, OrbitQuantity::Maximum | OrbitQuantity::Conjunction)
     }
@@ -77,7 +78,7 @@ impl OrbitQuantity {
         }
     }
 
-    /// What it is, in a line; `None` where the name says it.
+    /// Its description in one line; `None` where the name is enough.
     pub fn definition(self) -> Option<&'static str> {
         Some(match self {
             OrbitQuantity::Period | OrbitQuantity::Eccentricity => return None,
@@ -102,7 +103,7 @@ pub struct Estimate {
     pub sd: f64,
 }
 
-/// What must be known of star and data.
+/// Required properties of star and data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbitQuantities {
     /// Period (d) that `porb_over_prot` refers to.
@@ -116,7 +117,7 @@ pub struct OrbitQuantities {
 }
 
 impl OrbitQuantities {
-    /// Of a star and data of that span.
+    /// Those of a star and data of that span.
     pub fn new(star: &StarSettings, mass_msun: Option<f64>, time_span_d: Option<[f64; 2]>) -> Self {
         OrbitQuantities { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d, time_span_d, mass_msun }
     }
@@ -126,7 +127,7 @@ impl OrbitQuantities {
         self.time_span_d.map(|[first, last]| 0.5 * (first + last))
     }
 
-    /// What ephemerides are counted with.
+    /// Rotation period and epoch for ephemerides.
     pub fn clock(&self) -> Clock {
         Clock { rotation_period_d: self.rotation_period_d, epoch_d: self.epoch_d }
     }
@@ -136,7 +137,7 @@ impl OrbitQuantities {
         self.rotation_period_d * orbit.porb_over_prot
     }
 
-    /// Phase of an event, counted like phi; `None` for what is no event.
+    /// Phase of an event, counted like phi; `None` for other quantities.
     fn phase(quantity: OrbitQuantity, orbit: &Eccentric) -> Option<f64> {
         let maximum = maximum_phase(&orbit.orbit);
         match quantity {
@@ -153,8 +154,8 @@ impl OrbitQuantities {
         self.epoch_d + period * (turns + phase)
     }
 
-    /// The value for one orbit; an event nearest to `near`, or else to the middle of the data. `None` where it cannot
-    /// be had.
+    /// The value for one orbit; an event nearest to `near`, or else to the middle of the data. `None` where it is
+    /// undefined.
     pub fn value(&self, quantity: OrbitQuantity, orbit: &Eccentric, near: Option<f64>) -> Option<f64> {
         let period = self.period_d(&orbit.orbit);
         let value = match quantity {
@@ -172,8 +173,8 @@ impl OrbitQuantities {
         value.filter(|value| value.is_finite())
     }
 
-    /// The value for a circle with its error to first order, for errors of K, period over rotation period and phi of
-    /// that covariance. The error of an event is at most that of one of which nothing but the period is known.
+    /// The value for a circular orbit with its standard error to first order, from the covariance of K, period over
+    /// rotation period and phi. The error of an event is at most that of a uniform phase.
     pub fn estimate(&self, quantity: OrbitQuantity, orbit: &Orbit, covariance: &[[f64; 3]; 3]) -> Option<Estimate> {
         let value = self.value(quantity, &(*orbit).into(), None)?;
         let (prot, period) = (self.rotation_period_d, self.period_d(orbit));
@@ -194,7 +195,7 @@ impl OrbitQuantities {
     }
 }
 
-/// What a parameter of an orbit is, in a line, where its name does not say it.
+/// The description of a parameter of an orbit in one line, where its name is not enough.
 pub fn definition(parameter: &str) -> Option<&'static str> {
     Parameter::from_name(parameter)?.spec().definition
 }
@@ -215,7 +216,8 @@ mod tests {
         mass_msun: Some(0.9),
     };
 
-    /// Times are those at which the model's velocity is what they say, and no other such time is nearer to the middle.
+    /// Quoted times are those of the named event in the model's velocity, and no other such time is nearer to the
+    /// middle.
     #[test]
     fn times_are_those_of_the_velocities() {
         for (k, p, phi) in [(0.1, 1.7, 0.3), (0.4, 0.31, 0.99), (-0.1, 2.4, 0.6), (0.2, 30.0, 0.1)] {
@@ -241,7 +243,7 @@ mod tests {
     #[test]
     fn errors_are_propagated() {
         let orbit = Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.3 };
-        // period and phi of which only a combination is known, the phase 107 cycles after the epoch
+        // period and phi of which only a combination is constrained, the phase 107 cycles after the epoch
         let (sp, sphi, sk, small): (f64, f64, f64, f64) = (1e-3, 1e-3 * 62.7 / 1.7, 0.01, 1e-3);
         let covariance =
             [[sk * sk, 0.0, 0.0], [0.0, sp * sp, -sp * sphi], [0.0, -sp * sphi, sphi * sphi + small * small]];

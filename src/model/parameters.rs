@@ -1,8 +1,8 @@
-//! The parameters that may be sampled, and their table: a row each, with all that is true of one and of no other.
+//! The parameters that may be sampled, and their table: one row each, with all its properties.
 //!
 //! Config, checks, schema, tables, plots, exports, sampling coordinates and numerical derivatives read it. A parameter
-//! is added as a variant of [`Parameter`], a row in the same place of [`PARAMETERS`], and the number of
-//! [`super::values`] that it stands for.
+//! is added as a variant of [`Parameter`], a row in the same place of [`PARAMETERS`], and its field in
+//! [`super::values`].
 
 use super::prior::PriorKind::{self, Isotropic, LogUniform, Normal, Periodic, Uniform, UnitDisc};
 use super::values::{Element, FieldValues, StarValues};
@@ -65,15 +65,15 @@ pub enum Parameter {
     RegionEquivalentWidth,
     /// Its velocity (km/s) over that of the photosphere.
     RegionShift,
-    /// Surface with this line per unit of the spots' filling factor.
+    /// Area with this line per unit of the spots' filling factor.
     RegionArea,
-    /// How much more of it there is at the limb.
+    /// Its increase at the limb.
     RegionAreaLimb,
-    /// How much darker spots, with all that is around them, are at the limb.
+    /// Additional darkening of spots and their surroundings at the limb.
     RegionDimmingLimb,
-    /// Prior standard deviation of the spot filling factor, where maps are integrated over.
+    /// Prior standard deviation of the spot filling factor, under a marginal likelihood.
     SpotAmplitude,
-    /// Slope of the spots' spectrum there.
+    /// Power-law index of the spots' spectrum there.
     SpotSlope,
     /// Lifetime of the spots there (d).
     SpotLifetime,
@@ -92,17 +92,17 @@ pub struct Spec {
     pub latex: &'static str,
     /// The same in figures: cursive between asterisks, an index in `_{}`.
     pub symbol: &'static str,
-    /// What it is: its description among the free parameters.
+    /// Its description among the free parameters.
     pub about: &'static str,
-    /// What it is, in a line below tables, where its name does not say it.
+    /// Its description in one line below tables, where its name is not enough.
     pub definition: Option<&'static str>,
-    /// Where its value stands in the config.
+    /// Path of its value in the config.
     pub config_key: &'static str,
     /// Description of the value there, in a section that is made from this table.
     pub about_value: &'static str,
-    /// Which values make sense.
+    /// Its domain.
     pub values: Interval,
-    /// Size beyond which a value is a slip of the pen, see [`most`].
+    /// Size beyond which a value is a typing error, see [`most`].
     pub most: f64,
     /// Widest bounds of a prior.
     pub widest: (f64, f64),
@@ -114,16 +114,16 @@ pub struct Spec {
     pub usual: Option<f64>,
     /// The coordinate that samplers move in.
     pub scale: Scale,
-    /// Over what profiles change by a percent or so of their features, in that coordinate: what searches and first
-    /// trust regions are scaled with.
+    /// Step in that coordinate over which profiles change by about a percent of their features: the scale of searches
+    /// and first trust regions.
     pub step: Step,
     /// Step of the derivatives of profiles with respect to it.
     pub difference: Step,
-    /// What it belongs to, and its number there.
+    /// Its owner, and its element there.
     pub role: Role,
 }
 
-/// An interval, which says of each end whether it belongs to it.
+/// An interval with closed or open ends.
 pub type Interval = (Bound<f64>, Bound<f64>);
 
 /// The coordinate that samplers move in.
@@ -135,33 +135,34 @@ pub enum Scale {
     Logarithmic,
 }
 
-/// How long a step is.
+/// The size of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// So long.
+    /// This size.
     Fixed(f64),
-    /// So much of the value.
+    /// This fraction of the value.
     Relative(f64),
-    /// So many times the angular velocity that turns a map by a hundredth of a radian in half the time that it is seen.
+    /// This multiple of the angular velocity that turns a map by a hundredth of a radian in half the time of its
+    /// observation.
     Turn(f64),
-    /// That of a period over the rotation period: so much of an orbit in half the time base.
+    /// That of a period over the rotation period: this fraction of an orbit in half the time base.
     Ratio(f64),
     /// The same of a period in days.
     Period(f64),
-    /// So much of an orbit, in days.
+    /// This fraction of an orbit, in days.
     Time(f64),
 }
 
-/// What a parameter belongs to, and how its number is read and written there.
+/// The owner of a parameter, with access to its value there.
 #[derive(Clone, Copy, Debug)]
 pub enum Role {
     /// The orbit of planet 0 or 1.
     Orbit(usize, Element),
     /// Rotation, geometry and velocity of the star, which are always given.
     Star(fn(&StarValues) -> &f64, fn(&mut StarValues, f64)),
-    /// The surface: in place of one of the star's settings, where it is given.
+    /// The surface: replaces one of the star's settings, where given.
     Surface(fn(&Surface) -> Option<&f64>, fn(&mut Surface, f64)),
-    /// The field of spots that is marginalised.
+    /// The field of spots that is marginalised over.
     Field(fn(&FieldValues) -> Option<&f64>, fn(&mut FieldValues, f64)),
 }
 
@@ -170,10 +171,10 @@ pub fn turning(time_d: f64) -> f64 {
     0.01 / time_d
 }
 
-/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost,
-/// or the computation has no end.
+/// Bounds that no star exceeds: beyond them values are typing errors, digits of a phase are lost, or computations
+/// become endless.
 pub mod most {
-    /// Rotation velocity (km/s); velocity axes grow absurdly long beyond it.
+    /// Rotation velocity (km/s); velocity axes become too long beyond it.
     pub const VSINI_KMS: f64 = 2000.0;
     /// Any other velocity (km/s), up or down: that of light.
     pub const VELOCITY_KMS: f64 = 3e5;
@@ -192,7 +193,7 @@ const fn from_to((low, high): (f64, f64)) -> Interval {
     (Bound::Included(low), Bound::Included(high))
 }
 
-/// What rows have that say nothing else: a positive number of the star.
+/// Defaults of a row: a positive parameter of the star.
 const PLAIN: Spec = Spec {
     parameter: Parameter::K,
     key: "",
@@ -257,7 +258,7 @@ const SHAPE: Spec = Spec {
     ..PLAIN
 };
 
-/// A number of active regions that may lie within these bounds, and is this of spots that are the photosphere, dimmed.
+/// A parameter of active regions within these bounds, with this value for spots that are merely dimmed photosphere.
 const fn region(bounds: (f64, f64), plain: f64) -> Spec {
     Spec {
         values: from_to(bounds),
@@ -269,7 +270,7 @@ const fn region(bounds: (f64, f64), plain: f64) -> Spec {
     }
 }
 
-/// A number of the field that may lie within these bounds.
+/// A parameter of the field within these bounds.
 const fn field(bounds: (f64, f64), usual: f64, usual_prior: PriorKind) -> Spec {
     Spec {
         values: from_to(bounds),
@@ -529,7 +530,7 @@ pub const PARAMETERS: [Spec; 32] = [
         values: from_to((0.0, 1.0)),
         widest: (0.0, 1.0),
         step: Step::Fixed(0.01),
-        // the model is smooth in those of the surface, but for 1e-7 of it where a narrower line needs another velocity
+        // the model is smooth in those of the surface, except for 1e-7 where a narrower line needs another velocity
         // grid
         difference: Step::Fixed(0.02),
         role: Role::Surface(|surface| surface.limb_darkening.as_ref(), |surface, x| surface.limb_darkening = Some(x)),
@@ -711,7 +712,7 @@ impl Parameter {
         all
     };
 
-    /// Those of the field of spots that is integrated over.
+    /// Those of the field of spots that is marginalised over.
     pub const FIELD: [Parameter; 3] = [Parameter::SpotAmplitude, Parameter::SpotSlope, Parameter::SpotLifetime];
 
     /// Those of active regions.
@@ -757,7 +758,7 @@ impl Parameter {
         self.spec().usual.expect("a usual value")
     }
 
-    /// The number of an orbit that it is.
+    /// Its element of an orbit.
     fn element(self) -> Option<Element> {
         match self.spec().role {
             Role::Orbit(_, element) => Some(element),
@@ -775,7 +776,7 @@ impl Parameter {
         self.element() == Some(Element::Phase)
     }
 
-    /// Whether it is one of the two that say how eccentric an orbit is, and where its periastron.
+    /// Whether it is one of the two of eccentricity and periastron.
     pub fn is_shape(self) -> bool {
         matches!(self.element(), Some(Element::ShapeCos | Element::ShapeSin))
     }
@@ -785,23 +786,23 @@ impl Parameter {
         self.element() == Some(Element::Amplitude)
     }
 
-    /// Whether it stands in place of another parameter, in other units: it is free in its name alone, and
-    /// [`super::ParameterValues`] hold the other.
+    /// Whether it replaces another parameter, in other units: only its name is free, and [`super::ParameterValues`]
+    /// store the other.
     pub fn is_ephemeris(self) -> bool {
         matches!(self.element(), Some(Element::Period | Element::Conjunction))
     }
 
-    /// Whether it stands in place of one of the star's settings.
+    /// Whether it replaces one of the star's settings.
     pub fn is_surface(self) -> bool {
         matches!(self.spec().role, Role::Surface(..))
     }
 
-    /// Whether it says what is assumed of the spots where all maps are integrated over.
+    /// Whether it is a hyperparameter of the spots under a marginal likelihood.
     pub fn is_of_field(self) -> bool {
         matches!(self.spec().role, Role::Field(..))
     }
 
-    /// Whether values of all parameters may do without it.
+    /// Whether values of all parameters may lack it.
     pub fn is_optional(self) -> bool {
         match self.spec().role {
             Role::Orbit(planet, Element::Amplitude | Element::Ratio | Element::Phase) => planet > 0,
@@ -815,8 +816,7 @@ impl Parameter {
         self.spec().scale == Scale::Logarithmic
     }
 
-    /// The coordinate of its own that samplers move in, of a value; orbits have others
-    /// ([`super::ParameterSpace::to_sampling`]).
+    /// The sampling coordinate of a single value; orbits have others ([`super::ParameterSpace::to_sampling`]).
     pub fn to_sampling(self, value: f64) -> f64 {
         if self.is_logarithmic() { value.ln() } else { value }
     }
@@ -831,12 +831,12 @@ impl Parameter {
         if self.is_logarithmic() { value.ln() } else { 0.0 }
     }
 
-    /// Whether it only shifts whole profiles, so that what a pixel looks like does not depend on it.
+    /// Whether it only shifts whole profiles, so that the line of a pixel does not depend on it.
     pub fn only_shifts(self) -> bool {
         self.is_orbital() || self == Parameter::Vsys
     }
 
-    /// Whether it is one of the star's own that change profiles by more than a shift.
+    /// Whether it is one of the parameters of the star that change profiles by more than a shift.
     pub fn is_stellar(self) -> bool {
         !self.only_shifts() && !self.is_of_field()
     }

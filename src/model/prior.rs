@@ -36,15 +36,15 @@ pub enum Prior {
         /// Upper bound.
         max: f64,
     },
-    /// An angle in degrees with density proportional to its sine: an axis that may point anywhere.
+    /// An angle in degrees with density proportional to its sine: a random orientation.
     Isotropic {
         /// Lower bound (degrees).
         min: f64,
         /// Upper bound (degrees).
         max: f64,
     },
-    /// Of one of the two coordinates of a point in a disc around 0, which may be anywhere in it alike. The density of
-    /// both is not the product: [`super::ParameterSpace`] has it.
+    /// One of the two coordinates of a point with uniform density in a disc around 0. The density of both is not the
+    /// product: [`super::ParameterSpace`] has it.
     Disc {
         /// Square of the disc's radius: the largest eccentricity.
         max_eccentricity: f64,
@@ -151,7 +151,7 @@ impl Prior {
         const CELLS: usize = 4000;
         let (lo, hi) = match *self {
             Prior::Normal { mean, sd, min, max } => {
-                // beyond there is nothing
+                // the density is 0 beyond
                 let reach = 10.0 * sd + (mean.clamp(min, max) - mean).abs();
                 (min.max(mean - reach), max.min(mean + reach))
             }
@@ -237,7 +237,7 @@ impl Truncated {
         (half * sum).ln() - 0.5 * self.peak * self.peak
     }
 
-    /// Rejection from a uniform envelope: one draw in 40 or better is kept, wherever the bounds are.
+    /// Rejection from a uniform envelope: at least one draw in 40 is kept, wherever the bounds are.
     fn sample(&self, rng: &mut impl Rng) -> f64 {
         loop {
             let z = self.lo + rng.random::<f64>() * (self.hi - self.lo);

@@ -1,16 +1,16 @@
-//! Quantiles of priors: from the unit interval to a parameter, as nested samplers ask for it.
+//! Quantiles of priors: from the unit interval to a parameter, for nested samplers.
 
 use super::prior::Prior;
 use crate::numerics::normal::cumulative;
 
-/// Halvings of an interval, after which no double is left in between.
+/// Bisections after which no double remains in between.
 const HALVINGS: usize = 80;
 
-/// Standard deviations beyond which a normal distribution has nothing that a double could tell.
+/// Standard deviations beyond which tail probabilities underflow a double.
 const REACH: f64 = 38.0;
 
 impl Prior {
-    /// The value below which a share `u` of the prior lies, in the units of the parameter; always within the bounds.
+    /// The value below which a fraction `u` of the prior lies, in the units of the parameter; always within the bounds.
     ///
     /// `u` is from 0 to 1; what is outside counts as the nearer of both.
     pub fn quantile(&self, u: f64) -> f64 {
@@ -31,8 +31,8 @@ impl Prior {
     }
 }
 
-/// The quantile of one coordinate of a point in the unit disc, by bisection: the share below x is
-/// `1/2 + (x sqrt(1 - x^2) + asin x) / pi`.
+/// The quantile of one coordinate of a point in the unit disc, by bisection: the fraction below x is `1/2 + (x sqrt(1 -
+/// x^2) + asin x) / pi`.
 fn in_disc(u: f64) -> f64 {
     let (mut low, mut high) = (-1.0_f64, 1.0_f64);
     for _ in 0..HALVINGS {
@@ -66,7 +66,7 @@ fn normal_between(low: f64, high: f64, u: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The share below a value, by the midpoint rule from the lowest that counts.
+    /// The fraction below a value, by the midpoint rule from the lowest relevant value.
     fn share_below(prior: &Prior, low: f64, value: f64) -> f64 {
         const CELLS: usize = 40_000;
         let width = (value - low) / CELLS as f64;
@@ -90,13 +90,13 @@ mod tests {
         for (prior, low) in examples {
             for u in [0.001, 0.1, 0.5, 0.9, 0.999] {
                 let value = prior.quantile(u);
-                // the midpoint rule on 1/x over these cells is good to 1e-6
+                // the midpoint rule on 1/x over these cells is accurate to 1e-6
                 assert!((share_below(&prior, low, value) - u).abs() < 3e-6, "{prior:?} at {u}: {value}");
             }
             let ends = [0.0, 1.0, -0.5, 1.5].map(|u| prior.quantile(u));
             assert!(ends.iter().all(|end| prior.contains(*end) || end.is_infinite()), "{prior:?}: {ends:?}");
         }
-        // any number stands for its fractional part
+        // any number is equivalent to its fractional part
         assert_eq!(Prior::Periodic.quantile(1.0), 0.0);
     }
 }

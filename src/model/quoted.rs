@@ -1,4 +1,4 @@
-//! What is quoted of the orbits of one planet or two, draw by draw of a chain, and to first order around an optimum.
+//! Quoted quantities of the orbits of one planet or two, draw by draw of a chain, and to first order around an optimum.
 //!
 //! Statistics of draws are in `chain::derived`.
 
@@ -13,9 +13,9 @@ use std::sync::Arc;
 /// A quantity of one of the planets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quoted {
-    /// What.
+    /// The quantity.
     pub quantity: OrbitQuantity,
-    /// Of which planet: 0 or 1.
+    /// Index of the planet: 0 or 1.
     pub planet: usize,
 }
 
@@ -65,7 +65,7 @@ impl Quoted {
         &Elements::PLANETS[self.planet]
     }
 
-    /// Whether it says more than what is free and what is fixed.
+    /// Whether it adds information to the free and fixed parameters.
     fn follows(self, star: &OrbitQuantities, is_free: &dyn Fn(&[Parameter]) -> bool) -> bool {
         let Elements { k, ratio, period, phi, conjunction, shape, .. } = *self.elements();
         let eccentric = is_free(&shape);
@@ -134,7 +134,7 @@ impl OrbitQuantities {
                 };
                 Rule::Event { near, time_and_period: Arc::new(time_and_period) }
             }
-            // an angle comes back like an event
+            // an angle is periodic like an event
             Omega => {
                 let value = value(orbit);
                 Rule::Event { near: 180.0, time_and_period: Arc::new(move |theta| [value(theta), 360.0]) }
@@ -142,8 +142,8 @@ impl OrbitQuantities {
         })
     }
 
-    /// The value at `theta` with its error to first order, by differences along the parameters, whose covariance is
-    /// given. That of an event or angle is at most that of one of which nothing is known.
+    /// The value at `theta` with its standard error to first order, by differences along the parameters, whose
+    /// covariance is given. That of an event or angle is at most that of a uniform one.
     pub fn estimate_at(
         &self,
         quoted: Quoted,
@@ -151,7 +151,7 @@ impl OrbitQuantities {
         values: &ParameterValues,
         covariance: &DMatrix<f64>,
     ) -> Option<Estimate> {
-        /// Share of a standard deviation that a difference steps by.
+        /// Step of differences in standard deviations.
         const STEP: f64 = 1e-3;
         let orbit = self.orbit_at(quoted, free, values);
         let here = orbit(theta);
@@ -183,7 +183,7 @@ impl OrbitQuantities {
     }
 }
 
-/// What a quantity that follows from the parameters is, in a line, where its name does not say it.
+/// The description of a derived quantity in one line, where its name is not enough.
 pub fn quoted_definition(quantity: &str) -> Option<&'static str> {
     Quoted::from_name(quantity)?.quantity.definition()
 }
@@ -219,7 +219,7 @@ mod tests {
         assert!(Quoted::all().all(|quoted| Quoted::from_name(quoted.name()) == Some(quoted)));
     }
 
-    /// The errors of a circle are those of its own formulas.
+    /// Uncertainties of a circular orbit agree with its closed formulas.
     #[test]
     fn errors_of_a_circle_are_those_of_its_formulas() {
         let free = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi]

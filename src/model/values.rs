@@ -3,19 +3,19 @@
 
 use crate::star::{Eccentric, Motion, Orbit, Rotation, Shape, StarState, Surface};
 
-/// Values of all parameters, free or not. Periods in days and times of conjunctions are not among them: what they stand
-/// for is.
+/// Values of all parameters, free or not. Periods in days and times of conjunctions are stored as the parameters that
+/// they replace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterValues {
     /// Rotation, geometry and velocity of the star.
     pub star: StarValues,
-    /// The surface, where it is another one than that of the star's settings.
+    /// The surface, where it differs from the star's settings.
     pub surface: Surface,
     /// Orbit of the planet.
     pub first: OrbitValues,
     /// That of a second planet, if there is one.
     pub second: Option<OrbitValues>,
-    /// The field of spots, where it is marginalised.
+    /// The field of spots, where it is marginalised over.
     pub field: Option<FieldValues>,
 }
 
@@ -37,13 +37,13 @@ pub struct StarValues {
 /// An orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbitValues {
-    /// The orbit, but for its shape.
+    /// The orbit without its shape.
     pub orbit: Orbit,
-    /// Its shape; a circle if it is not given.
+    /// Its shape; circular if not given.
     pub shape: Option<Shape>,
 }
 
-/// One of the numbers of an orbit.
+/// One of the elements of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// Semi-amplitude (km/s).
@@ -65,15 +65,15 @@ pub enum Element {
 /// A Gaussian field of spots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FieldValues {
-    /// Standard deviation of the filling factor before the data.
+    /// Prior standard deviation of the filling factor.
     pub amplitude: f64,
-    /// Slope of the spectrum.
+    /// Power-law index of the spectrum.
     pub slope: f64,
-    /// Lifetime of spots (d); spots do not change where it is not given.
+    /// Lifetime of spots (d); static spots where not given.
     pub lifetime_d: Option<f64>,
 }
 
-/// An orbit of which nothing is given yet: no orbit at all, as it has no period.
+/// An orbit without any element set: no valid orbit, as it has no period.
 const NO_ORBIT: OrbitValues = OrbitValues { orbit: Orbit { k_kms: 0.0, porb_over_prot: 0.0, phi: 0.0 }, shape: None };
 
 impl OrbitValues {
@@ -82,7 +82,7 @@ impl OrbitValues {
         Eccentric { orbit: self.orbit, shape: self.shape.unwrap_or_default() }
     }
 
-    /// One of its numbers, if it is given; a period in days or a conjunction never is.
+    /// One of its elements, if set; a period in days or a conjunction never is.
     pub fn get(&self, element: Element) -> Option<&f64> {
         match element {
             Element::Amplitude => Some(&self.orbit.k_kms),
@@ -111,7 +111,7 @@ impl OrbitValues {
 }
 
 impl ParameterValues {
-    /// Of the eight parameters of a circular orbit, rotation and systemic velocity; the surface is that of the star's
+    /// From the eight parameters of a circular orbit, rotation and systemic velocity; the surface is that of the star's
     /// settings.
     pub fn of_eight(eight: [f64; 8]) -> Self {
         let [k_kms, porb_over_prot, phi, omega_eq_rad_d, domega_rad_d, inclination_deg, vsini_kms, vsys_kms] = eight;
@@ -124,12 +124,12 @@ impl ParameterValues {
         }
     }
 
-    /// The orbit of planet 0 or 1, if it is there.
+    /// The orbit of planet 0 or 1, if there is one.
     pub fn orbit(&self, planet: usize) -> Option<&OrbitValues> {
         if planet == 0 { Some(&self.first) } else { self.second.as_ref() }
     }
 
-    /// The orbit of planet 0 or 1, which is there from now on.
+    /// The orbit of planet 0 or 1, created if missing.
     pub fn orbit_mut(&mut self, planet: usize) -> &mut OrbitValues {
         if planet == 0 { &mut self.first } else { self.second.get_or_insert(NO_ORBIT) }
     }
@@ -144,7 +144,7 @@ impl ParameterValues {
         Motion { first: self.first.eccentric(), second: self.second.as_ref().map(OrbitValues::eccentric) }
     }
 
-    /// The physical state of star and planet they stand for.
+    /// The physical state of star and planet.
     pub fn state(&self) -> StarState {
         let StarValues { omega_eq_rad_d, domega_rad_d, inclination_deg, vsini_kms, vsys_kms } = self.star;
         StarState {

@@ -1,23 +1,23 @@
-//! What JSON does not have: numbers that are not finite, which are written as null and come back as NaN, and parts of
-//! an object that are there with all their keys, or not at all.
+//! Additions to JSON: non-finite numbers, which are written as null and read as NaN, and parts of an object that are
+//! present with all their keys, or absent.
 
 use serde::de::{DeserializeOwned, Error, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
-/// For numbers that may be none, such as a mean over nothing.
+/// For numbers that may be NaN, such as an empty mean.
 pub fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
-/// Keys of an object that are there together, or not at all.
+/// Keys of an object that are all present or all absent.
 pub trait Part: DeserializeOwned {
     /// These keys.
     const KEYS: &'static [&'static str];
 }
 
-/// For a flattened part: `None` where none of its keys is there. Where one is, a fault of any is an error that names
-/// it; a flattened `Option` of serde's own would be `None`.
+/// For a flattened part: `None` where none of its keys is present. Otherwise a fault of any key is an error that names
+/// it; with plain serde a flattened `Option` would be `None`.
 pub fn part<'de, D: Deserializer<'de>, T: Part>(deserializer: D) -> Result<Option<T>, D::Error> {
     let own = deserializer.deserialize_map(Own(T::KEYS))?;
     if own.is_empty() {

@@ -1,9 +1,9 @@
-//! Numbers, without a star in sight.
+//! General numerics, independent of stars.
 //!
 //! In: slices of numbers. Out: the same numbers on every machine by vector instructions chosen at run time
-//! ([`vector`]), radians and km/s from what people write ([`units`]), probabilities ([`normal`]), tables for a terminal
-//! ([`text`]), numbers from files where some are none ([`json`]), sums of what only its logarithm can hold
-//! ([`logarithms`]), what is found when it is first asked for ([`once`]), [`quantile`]s.
+//! ([`vector`]), radians and km/s from other units ([`units`]), probabilities ([`normal`]), tables for a terminal
+//! ([`text`]), numbers from files with missing values ([`json`]), sums in logarithms ([`logarithms`]), lazy values
+//! ([`once`]), [`quantile`]s.
 
 pub mod json;
 pub mod logarithms;

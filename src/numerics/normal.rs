@@ -8,7 +8,7 @@ pub fn cumulative(x: f64) -> f64 {
     0.5 * erfc(-x * FRAC_1_SQRT_2)
 }
 
-/// Its logarithm, far below zero, too.
+/// Its logarithm, also far below zero.
 pub fn ln_cumulative(x: f64) -> f64 {
     // the first terms of Mills' ratio are exact to 1e-7 there
     const FAR: f64 = -30.0;

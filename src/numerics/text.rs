@@ -1,9 +1,9 @@
-//! Tables as text, and text of others in a line of one's own.
+//! Tables as text, and untrusted text in one line.
 
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Text of others, such as a file's name, with control characters as escapes (`\n`, `\u{1b}`): it can neither break a
+/// Untrusted text, such as a file's name, with control characters as escapes (`\n`, `\u{1b}`): it can neither break a
 /// line nor command a terminal.
 pub fn escaped(text: &str) -> Cow<'_, str> {
     if !text.contains(char::is_control) {
@@ -13,7 +13,7 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(escape).collect())
 }
 
-/// A path as it is shown.
+/// A path for display.
 pub fn shown(path: &Path) -> String {
     escaped(&path.to_string_lossy()).into_owned()
 }
@@ -58,7 +58,7 @@ pub fn listed<'a>(numbers: impl IntoIterator<Item = (&'a String, &'a f64)>) -> S
     numbers.into_iter().map(one).collect()
 }
 
-/// How a column is set.
+/// Alignment of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     /// To the left.
@@ -76,7 +76,7 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
     columns(rows, &aligns)
 }
 
-/// Columns under each other, each set as `aligns` says; rows have as many. Nothing trails a line.
+/// Columns under each other, each set according to `aligns`; rows have equally many. Lines have no trailing blanks.
 pub fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..aligns.len()).map(width).collect();

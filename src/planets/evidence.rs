@@ -1,15 +1,15 @@
-//! How much more likely the profiles are with planets than without: Bayes factors of no, one and two planets, on
-//! circles and on ellipses, and the false inclusion probability over periods (`docs/method.md` section 4).
+//! Bayes factors of no, one and two planets on circular and Keplerian orbits, and the false inclusion probability over
+//! periods (`docs/method.md` section 4).
 //!
-//! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, integrated over the priors of its orbits
-//! and over the velocity jitter, which all models share; of no planet it is 0. At each period K and the phase are
-//! integrated numerically along rays through K = 0, on which the quadratic is a parabola: so any prior of K will do.
-//! One circle is a sum over all periods. Eccentricity and periastron of one ellipse, and the first of two circles, are
-//! importance samples of draws from what the circle says, with the scatter of independent repetitions; the second of
-//! two circles is integrated like a single one.
+//! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, marginalised over the priors of its orbits
+//! and over the RV jitter, which all models share; without a planet it is 0. At each period K and the phase are
+//! integrated numerically along rays through K = 0, on which the quadratic is a parabola: so any prior of K is
+//! possible. For one circular orbit it is a sum over all periods. Eccentricity and periastron of one Keplerian orbit,
+//! and the first of two circular orbits, are importance-sampled from the posterior of one circular orbit, and
+//! independent repetitions give the standard error. The second of two circular orbits is integrated like a single one.
 //!
 //! The false inclusion probability of an interval of frequencies (Hara et al. 2022, A&A 663, A14) is the posterior
-//! probability that no planet has its frequency there, none and one planet taken for equally likely before the data.
+//! probability that no planet has its frequency there, with equal prior probabilities of none and one planet.
 
 use super::periodogram::Jitters;
 use super::periodogram::orbits::{Trial, mid_cycle, scan};
@@ -32,11 +32,11 @@ pub struct Density<'a> {
     pub ln: &'a (dyn Fn(f64) -> f64 + Sync),
     /// Bounds.
     pub bounds: [f64; 2],
-    /// Whether it is uniform between them: integrals over it then have a closed form.
+    /// Whether it is uniform between them: its integrals then have a closed form.
     pub uniform: bool,
 }
 
-/// What is known of a planet before the data. Phases are uniform.
+/// Priors of a planet. Phases are uniform.
 pub struct PlanetPrior<'a> {
     /// Of K (km/s), 0 or more.
     pub k: Density<'a>,
@@ -46,12 +46,13 @@ pub struct PlanetPrior<'a> {
     pub largest_e: f64,
 }
 
-/// ln of a Bayes factor over no planet, with the scatter of independent repetitions; exact where that is null.
+/// ln of a Bayes factor relative to no planet, with the standard deviation of independent repetitions; exact where that
+/// is null.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LnBayes {
     /// ln of the ratio of marginal likelihoods.
     pub ln_bayes: f64,
-    /// Standard error by the scatter of the repetitions; null where there is no random number in it.
+    /// Standard error from the repetitions; null where no random number enters.
     pub sd: Option<f64>,
 }
 
@@ -67,35 +68,35 @@ pub struct Inclusion {
 /// The evidence for planets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
-    /// Of one planet on a circle.
+    /// Of one planet on a circular orbit.
     pub circle: LnBayes,
-    /// Of one planet on an ellipse.
+    /// Of one planet on a Keplerian orbit.
     pub ellipse: LnBayes,
-    /// Of two planets on circles.
+    /// Of two planets on circular orbits.
     pub two_circles: LnBayes,
     /// The intervals of least false inclusion probability that do not overlap, from low to high.
     pub inclusion: Vec<Inclusion>,
 }
 
-/// Frequencies to each inverse time base: a peak of 50 in ln L is a tenth of one wide.
+/// Frequencies per inverse time base: a peak of 50 in ln L is a tenth of one wide.
 const OVERSAMPLING: f64 = 60.0;
 
 /// Most frequencies.
 const MOST_FREQUENCIES: usize = 40_000;
 
-/// Draws of a repetition, and repetitions.
+/// Draws per repetition, and number of repetitions.
 const DRAWS: usize = 4000;
 const REPETITIONS: usize = 8;
 
 /// Share of the draws of periods that are spread over the prior.
 const EVEN: f64 = 0.1;
 
-/// Intervals of least false inclusion probability that are told.
+/// Number of reported intervals of least false inclusion probability.
 const TOLD: usize = 5;
 
-/// Marginal likelihoods of the models, over that of no planet. Every model, that of no planet among them, is integrated
-/// over the same prior of the velocity jitter and of offsets of nights, uniform up to the largest of `jitters`: what
-/// these take up without a planet counts for no planet alone. `None` where the velocities do not bound an orbit.
+/// Marginal likelihoods of the models relative to no planet. Every model, including no planet, is marginalised over the
+/// same prior of the RV jitter and of nightly offsets, uniform up to the largest of `jitters`: what these absorb
+/// without a planet counts in favour of no planet only. `None` where the velocities do not bound an orbit.
 pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
     let weights = jitters.ln_weights();
     let alone = ln_sum(&weights);
@@ -120,8 +121,8 @@ pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Opti
     Some(Evidence { circle, ellipse, two_circles, inclusion: Periodogram::mixed(&weights, &ones).inclusion() })
 }
 
-/// Sizes of the jitter beside which one planet is less likely than beside the best by that in ln are left out of what
-/// draws estimate.
+/// Jitters whose one-planet evidence is lower than that of the best jitter by more than this (ln) are left out of the
+/// Monte Carlo estimates.
 const NEGLIGIBLE: f64 = 8.0;
 
 /// The mean of Bayes factors with weights given as logarithms.
@@ -133,11 +134,11 @@ fn mixed(parts: &[(f64, LnBayes)]) -> LnBayes {
     LnBayes { ln_bayes, sd: Some(variance.sqrt()) }
 }
 
-/// What draws are made of, beside a jitter of one size.
+/// Proposal distributions at one jitter.
 struct OfLevel<'a> {
     /// One planet.
     one: &'a Periodogram,
-    /// The second where the first is at its best, and the other way round.
+    /// The second with the first at its best, and vice versa.
     beside: Option<Periodogram>,
     other: Periodogram,
     before: Option<Periodogram>,
@@ -177,9 +178,9 @@ fn repeated(seed: u64, estimate: impl Fn(&mut ChaCha8Rng) -> f64 + Sync) -> LnBa
 struct Periodogram {
     lowest: f64,
     width: f64,
-    /// ln Z at each frequency, prior of the frequency included.
+    /// ln Z at each frequency, including the prior of the frequency.
     ln_cells: Vec<f64>,
-    /// Probabilities of drawing from each, and of all up to it.
+    /// Probability of drawing each frequency, and cumulative probability.
     drawn: Vec<f64>,
     cumulative: Vec<f64>,
     ln_z: f64,
@@ -219,7 +220,8 @@ impl Periodogram {
         Some(Periodogram { lowest, width, ln_cells, drawn, cumulative, ln_z, time_base })
     }
 
-    /// The posterior of the frequency beside a jitter of all sizes: of `levels`, whose weights are logarithms.
+    /// The posterior of the frequency, marginalised over the jitter: over `levels`, with the logarithms of their
+    /// weights.
     fn mixed(weights: &[f64], levels: &[Periodogram]) -> Self {
         let alone = ln_sum(weights);
         let cell = |k: usize| {
@@ -264,7 +266,7 @@ impl Periodogram {
     /// The intervals that hold most of the posterior of one planet.
     fn inclusion(&self) -> Vec<Inclusion> {
         let half = ((0.5 / self.time_base / self.width).round() as usize).max(1);
-        // none and one planet alike before the data
+        // equal prior probabilities of none and one planet
         let one = 1.0 / (1.0 + (-self.ln_z).exp());
         let posterior: Vec<f64> = self.ln_cells.iter().map(|x| one * (x - self.ln_z).exp()).collect();
         let mut before = vec![0.0];
@@ -277,7 +279,7 @@ impl Periodogram {
         cells.sort_by(|a, b| within(*b).total_cmp(&within(*a)));
         let mut told: Vec<usize> = Vec::new();
         for cell in cells {
-            // of all intervals that hold a peak that in whose middle it is
+            // of all intervals that contain a peak, the one centred on it
             let around = cell.saturating_sub(half)..(cell + half + 1).min(posterior.len());
             let cell = around.max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(cell);
             if told.len() < TOLD && told.iter().all(|other| other.abs_diff(cell) > 2 * half) {
@@ -293,14 +295,14 @@ impl Periodogram {
     }
 }
 
-/// Directions of a half turn and nodes along a ray: enough for parabolas, whose width each ray knows.
+/// Directions over half a turn, and nodes along a ray: enough for parabolas whose width is known for each ray.
 const NODES: usize = 40;
 
-/// Standard errors of K that a ray is followed for, beyond its highest point.
+/// A ray is followed for this many standard errors of K beyond its highest point.
 const REACH: f64 = 8.0;
 
-/// Standard errors from the parabola's top to the bounds, and between these, for which shares of a normal distribution
-/// are numbers and exact.
+/// Distances (standard errors) from the parabola's maximum to the bounds, and between the bounds, up to which
+/// differences of the normal distribution function are finite and exact.
 const TAILS: f64 = 30.0;
 const NARROW: f64 = 1e-3;
 
@@ -321,17 +323,17 @@ fn ln_over_k_and_phase(a: &Matrix2<f64>, b: &Vector2<f64>, prior: &Density) -> f
 /// ln of the integral of `exp(g K - a K^2 / 2)` over the prior of K.
 fn ln_along_ray(a: f64, g: f64, prior: &Density) -> f64 {
     let [low, high] = prior.bounds.map(|bound| (bound - g / a) * a.sqrt());
-    // nearly all time of all models is spent here, and over a uniform prior panels take thirty times as long
+    // nearly all computing time is spent here, and panels over a uniform prior take thirty times as long
     let closed = prior.uniform && low < TAILS && high > -TAILS && high - low > NARROW;
     if !closed {
         return ln_by_panels(a, g, prior);
     }
-    // of two tails the difference of the smaller ones
+    // take the difference of the two smaller tails
     let share = if low > 0.0 { cumulative(-low) - cumulative(-high) } else { cumulative(high) - cumulative(low) };
     0.5 * (g * g / a + (TAU / a).ln()) + share.ln() + (prior.ln)(prior.bounds[0])
 }
 
-/// The same by Gauss-Legendre panels where it matters.
+/// The same by Gauss-Legendre panels where the integrand is not negligible.
 fn ln_by_panels(a: f64, g: f64, prior: &Density) -> f64 {
     const ABSCISSA: f64 = 0.577_350_269_189_625_8;
     let [low, high] = prior.bounds;
@@ -361,12 +363,12 @@ fn projected(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> (DMatrix<f64>, 
     (0.5 * (&a + a.transpose()), x.tr_mul(&quadratic.gradient))
 }
 
-/// An estimate of ln Z of one ellipse.
+/// An estimate of ln Z of one Keplerian orbit.
 fn ellipse(quadratic: &VelocityQuadratic, prior: &PlanetPrior, circle: &Periodogram, rng: &mut ChaCha8Rng) -> f64 {
     let mid = mid_cycle(&quadratic.cycles);
     let weight = |_: usize| {
         let frequency = circle.draw(rng);
-        // uniform in e and in the mean anomaly at mid-time, as the prior; nearly circular ones more often
+        // uniform in e and in the mean anomaly at mid-time, like the prior; nearly circular orbits more often
         let root: f64 = rng.random();
         let (e, anomaly) = (prior.largest_e * root * root, TAU * rng.random::<f64>());
         let ln_e = (2.0 * root.max(f64::MIN_POSITIVE)).ln();
@@ -384,7 +386,7 @@ fn ellipse(quadratic: &VelocityQuadratic, prior: &PlanetPrior, circle: &Periodog
     ln_sum(&all) - (DRAWS as f64).ln()
 }
 
-/// An estimate of ln Z of two circles; frequencies are drawn from the `pairs` alike.
+/// An estimate of ln Z of two circular orbits; frequencies are drawn from the `pairs` with equal probability.
 fn two_circles(
     quadratic: &VelocityQuadratic,
     priors: [&PlanetPrior; 2],
@@ -431,8 +433,8 @@ fn two_circles(
     ln_sum(&all) - (DRAWS as f64).ln()
 }
 
-/// What (a, b) of the first of two orbits are drawn from: a Gaussian somewhat wider than its own, or any phase and K up
-/// to beyond it alike, which is as dense at K = 0 as the prior.
+/// Proposal distribution of (a, b) of the first of two orbits: a mixture of a Gaussian somewhat wider than its
+/// posterior, and a uniform phase and K up to beyond it, which has the density of the prior at K = 0.
 struct FirstOrbit {
     mode: Vector2<f64>,
     /// Lower factor of the information.
@@ -440,7 +442,7 @@ struct FirstOrbit {
     largest_k: f64,
 }
 
-/// Factor on the standard errors of that Gaussian.
+/// Factor by which the standard errors of that Gaussian are widened.
 const WIDER: f64 = 1.3;
 
 impl FirstOrbit {

@@ -1,11 +1,11 @@
-//! A number of which several Gaussians say what it may be, such as K at all ephemerides within their errors.
+//! A quantity whose posterior is a mixture of Gaussians, such as K at all ephemerides within their uncertainties.
 
 use crate::numerics::{logarithms::ln_sum, normal};
 
 /// One of the Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
-    /// ln of its share, up to a constant.
+    /// ln of its weight, up to a constant.
     pub ln_weight: f64,
     /// Mean.
     pub mean: f64,
@@ -13,14 +13,14 @@ pub struct Part {
     pub sd: f64,
 }
 
-/// All of them.
+/// The mixture.
 #[derive(Clone, Debug)]
 pub struct Mixture {
     parts: Vec<Part>,
 }
 
 impl Mixture {
-    /// Of these; `None` where a number is not finite or there are none.
+    /// A mixture of these; `None` where a number is not finite or there are none.
     pub fn new(parts: Vec<Part>) -> Option<Self> {
         let finite = |part: &Part| part.ln_weight.is_finite() && part.mean.is_finite() && part.sd.is_finite();
         (!parts.is_empty() && parts.iter().all(finite)).then_some(Mixture { parts })
@@ -33,11 +33,11 @@ impl Mixture {
         [mean, variance.sqrt()]
     }
 
-    /// 95 % upper limit on a number that is 0 or more.
+    /// 95 % upper limit on a quantity that is 0 or more.
     pub fn upper95(&self) -> f64 {
         const HALVINGS: usize = 100;
         let above = |x: f64| self.ln_sum(|part| part.ln_weight + normal::ln_cumulative((part.mean - x) / part.sd));
-        // of what lies above zero, a twentieth is above the limit
+        // a twentieth of the probability above zero lies above the limit
         let wanted = above(0.0) + 0.05f64.ln();
         let (mut low, mut high) = (0.0, self.parts.iter().map(|part| part.sd).fold(0.0, f64::max));
         while above(high) > wanted {
@@ -70,10 +70,10 @@ mod tests {
 
     #[test]
     fn a_limit_is_that_of_what_lies_above_zero() {
-        // 1.6449 sigma one-sided is 5 %, and 1.96 sigma are the limit of a number whose bound at zero does not matter
+        // 1.6449 sigma one-sided is 5 %; 1.96 sigma is the limit of a quantity far from its bound at zero
         assert!((upper95(1.0, 0.01) - (1.0 + 0.016449)).abs() < 1e-6);
         assert!((upper95(0.0, 1.0) - 1.95996).abs() < 1e-4);
-        // so far below zero what is left is exponential
+        // that far below zero the remaining tail is exponential
         assert!((upper95(-60.0, 1.0) * 60.0 - 20.0f64.ln()).abs() < 0.01);
         assert!((upper95(-36.0, 1.0) * 36.0 - 3.0).abs() < 0.02);
     }

@@ -1,8 +1,8 @@
 //! The modes of a posterior in the period: how many orbits it holds, and how much weight each has.
 //!
-//! A time base T tells frequencies that differ by some 1/T, and a posterior of periods is a few such peaks. Draws are
-//! smoothed in frequency by a part of that width, and the line is cut wherever the density falls below half of the
-//! lower peak beside it.
+//! A time base T resolves frequencies that differ by some 1/T, and a posterior of periods consists of a few such peaks.
+//! Draws are smoothed in frequency by a part of that width, and the axis is cut wherever the density falls below half
+//! of the lower adjacent peak.
 
 use crate::numerics::quantile::quantile;
 use crate::planets::periodogram::RotationPeriods;
@@ -12,22 +12,22 @@ use serde::{Deserialize, Serialize};
 /// Smoothing, in inverse time bases.
 const SMOOTHING: f64 = 0.1;
 
-/// Bins to a width of the smoothing.
+/// Bins per width of the smoothing.
 const FINENESS: f64 = 4.0;
 
-/// A valley parts two peaks where it is lower than this share of the lower one.
+/// A valley separates two peaks where it is below this fraction of the lower one.
 const VALLEY: f64 = 0.5;
 
-/// Modes of less weight are not told.
+/// Modes of less weight are not reported.
 const LEAST: f64 = 0.02;
 
 /// More bins than this are never needed.
 const MOST_BINS: f64 = 1e6;
 
-/// A mode that is wider than this (inverse time bases) is none: the data do not tell its periods from each other.
+/// A mode that is wider than this (inverse time bases) does not count: the data do not distinguish its periods.
 const BROAD: f64 = 1.0;
 
-/// A period in no more modes than this, which hold at least that share of the draws, is constrained.
+/// A period is constrained if at most this many modes hold at least that share of the draws.
 const FEW: (usize, f64) = (3, 0.68);
 
 /// A mode of the period.
@@ -41,12 +41,12 @@ pub struct PeriodMode {
     pub ci68: [f64; 2],
     /// Median semi-amplitude (km/s) within it.
     pub k_kms: f64,
-    /// The period of the star, or alias of one, that it is not told from.
+    /// The period of the star, or alias of one, from which it is not distinguished.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<String>,
 }
 
-/// The modes, from the heaviest on, of draws (`Porb/Prot`, K), with the periods of the star that they are close to.
+/// The modes of draws (`Porb/Prot`, K), largest weight first, with the periods of the star that they are close to.
 pub fn period_modes(draws: &[(f64, f64)], rotation: &RotationPeriods, rotation_period_d: f64) -> Vec<PeriodMode> {
     let mut modes = parted(draws, rotation.time_base_cycles);
     for mode in modes.iter_mut().filter(|mode| !mode.is_broad(rotation)) {
@@ -60,11 +60,11 @@ pub fn period_modes(draws: &[(f64, f64)], rotation: &RotationPeriods, rotation_p
 /// Whether a few narrow modes hold most of the draws.
 pub fn are_few(modes: &[PeriodMode], rotation: &RotationPeriods) -> bool {
     let narrow = modes.iter().filter(|mode| !mode.is_broad(rotation));
-    // a single one that is as wide as the prior is none
+    // a single mode as wide as the prior does not count
     modes.len() > 1 && narrow.take(FEW.0).map(|mode| mode.weight).sum::<f64>() >= FEW.1
 }
 
-/// What speaks against a planet of that period: that it is not one, or that of the star.
+/// Caveats of a planet of that period: the period is ambiguous, or is one of the star's.
 pub fn doubts(modes: &[PeriodMode]) -> Vec<Remark> {
     let Some(heaviest) = modes.first() else { return Vec::new() };
     let of_the_star = heaviest.rotation.as_ref().map(|words| {
@@ -126,7 +126,7 @@ fn mode(weight: f64, inside: &[(f64, f64)]) -> PeriodMode {
     PeriodMode { weight, porb_over_prot: middle, ci68: [low, high], k_kms, rotation: None }
 }
 
-/// Under a Gaussian of that many bins.
+/// Convolved with a Gaussian of that many bins.
 fn smoothed(density: &[f64], bandwidth: f64) -> Vec<f64> {
     let reach = (4.0 * bandwidth).ceil() as usize;
     let kernel: Vec<f64> = (0..=reach).map(|i| (-0.5 * (i as f64 / bandwidth).powi(2)).exp()).collect();

@@ -1,8 +1,8 @@
 //! The rate of planets in a sample of stars, each searched with a completeness that was measured by injections.
 //!
-//! A star has a planet in a box of period and semi-amplitude (or minimum mass) with the probability f, and one at most.
-//! The search shows it with the probability c, the mean completeness over the box. Where no planet shows, the highest
-//! peak is a false alarm in the box with the probability `alpha`. With q = f c the likelihood of a star is
+//! A star has at most one planet in a box of period and semi-amplitude (or minimum mass), with the probability f. The
+//! search recovers it with the probability c, the mean completeness over the box. Where no planet is recovered, the
+//! highest peak is a false alarm in the box with the probability `alpha`. With q = f c the likelihood of a star is
 //!
 //! - without a signal in the box: `(1 - q) (1 - alpha)`;
 //! - with one of false-alarm probability p: `q g + (1 - q) alpha h`, where g and h are the densities of Delta ln L
@@ -11,7 +11,7 @@
 //!
 //! Factors without f are left out. The log-likelihood is a sum of logarithms of linear functions of f, hence concave,
 //! and regions of highest likelihood are intervals. Left out: several planets around one star, planets found at an
-//! alias of their period, and false alarms that are no chance (the search names those of rotation).
+//! alias of their period, and spurious peaks that are not due to chance (the search flags those of rotation).
 
 use serde::{Deserialize, Serialize};
 
@@ -25,8 +25,8 @@ pub struct Completeness {
 }
 
 impl Completeness {
-    /// Of fractions `recovered` at rising `periods_d` and `k_kms`, period after period. `None` where these are not two
-    /// at least each, above 0 and rising, or not as many as the fractions, or a fraction is not from 0 to 1.
+    /// Completeness from fractions `recovered` at rising `periods_d` and `k_kms`, period after period. `None` unless
+    /// there are at least two of each, positive and rising, with one fraction between 0 and 1 for each pair.
     pub fn new(periods_d: &[f64], k_kms: &[f64], recovered: Vec<f64>) -> Option<Self> {
         let rises = |x: &[f64]| {
             x.len() > 1 && x[0] > 0.0 && x.windows(2).all(|two| two[0] < two[1]) && x[x.len() - 1].is_finite()
@@ -92,8 +92,8 @@ pub struct Span {
     pub sizes: [f64; 2],
 }
 
-/// Share of the false alarms of a search that look like planets of a box: evenly in frequency over the `searched`
-/// periods (d), with the K (km/s) that is just detected at their period, `None` where none is.
+/// Fraction of the spurious peaks of a search that fall in a box: uniform in frequency over the `searched` periods (d),
+/// with the smallest detectable K (km/s) at their period, `None` where there is none.
 pub fn share_of_false_alarms(
     planets: &Span,
     searched: [f64; 2],
@@ -138,7 +138,7 @@ pub struct Member {
 pub struct InBox {
     /// Probability that it is a planet's, if not chance, and that its period and size are in the box.
     pub share: f64,
-    /// Density of false alarms over that of detected planets, `alpha h / g`.
+    /// Density of spurious peaks over that of detected planets, `alpha h / g`.
     pub chance: f64,
 }
 

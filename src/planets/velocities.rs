@@ -1,5 +1,5 @@
 //! The log-likelihood as a quadratic in the radial velocities of the profiles, with the star's own spots marginalised
-//! out (`docs/method.md` section 4): `ln L(V) = ln L(0) + g V - V I V / 2`, one velocity V a profile.
+//! out (`docs/method.md` section 4): `ln L(V) = ln L(0) + g V - V I V / 2`, one velocity V per profile.
 //!
 //! Everything linear in the velocities follows in closed form: radial velocities with their covariance here, orbits in
 //! `periodogram`.
@@ -17,7 +17,7 @@ pub struct VelocityQuadratic {
     pub information: DMatrix<f64>,
 }
 
-/// The information is not positive definite: to second order, some velocities are not bounded by the data.
+/// The information is not positive definite: to second order, some velocities are unbounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the likelihood has no maximum in the velocities of the profiles: its curvature is not negative definite")]
 pub struct NotConcave;
@@ -38,13 +38,14 @@ impl VelocityQuadratic {
         self.gradient.dot(v) - 0.5 * v.dot(&(&self.information * v))
     }
 
-    /// Counts velocities in that were left out (km/s, of the rotation cycle): what was ln L of 0 is ln L of these.
+    /// Shifts the origin of velocities (km/s, as a function of the rotation cycle): the former ln L at 0 is now that at
+    /// these velocities.
     pub fn count_in(&mut self, velocity_kms: impl Fn(f64) -> f64) {
         let v = DVector::from_iterator(self.len(), self.cycles.iter().map(|cycle| velocity_kms(*cycle)));
         self.gradient += &self.information * v;
     }
 
-    /// The same with the amplitudes of the columns of `x` (profiles x amplitudes) left free: gradient `Q g`,
+    /// The same with the amplitudes of the columns of `x` (profiles x amplitudes) marginalised: gradient `Q g`,
     /// information `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). `None` where they are not bounded.
     pub fn beside(&self, x: &DMatrix<f64>) -> Option<Self> {
         let ix = &self.information * x;

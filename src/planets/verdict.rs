@@ -1,63 +1,63 @@
-//! What is said of a planet: every threshold, and the one sentence that heads every result.
+//! The verdict on a planet: all thresholds, and the one sentence that heads every result.
 //!
-//! One number is compared with the thresholds: the probability that a star without a planet shows a peak as high
-//! anywhere in the blind search. A detection also needs that nothing speaks against it; otherwise it is a candidate,
-//! and the sentence names the reasons. Whether a chain has converged is another question, and is not part of it.
+//! One number is compared with the thresholds: the false-alarm probability of the highest peak over the whole blind
+//! search. A detection must also have no caveats; otherwise it is a candidate, and the sentence names them. Convergence
+//! of a chain does not enter.
 
 use crate::numerics::normal;
 use serde::{Deserialize, Serialize};
 
-/// Above this false-alarm probability no planet is needed.
+/// Above this false-alarm probability there is no significant signal.
 pub const CANDIDATE_FAP: f64 = 0.01;
 
-/// Below this false-alarm probability a candidate against which nothing speaks is a detection.
+/// Below this false-alarm probability a candidate without caveats is a detection.
 pub const DETECTION_FAP: f64 = 1e-3;
 
 /// A period with a smaller posterior share than this is ambiguous: odds of 20 to 1.
 pub const UNAMBIGUOUS: f64 = 0.95;
 
-/// Periods of a smaller share are not told.
+/// Periods of a smaller share are not reported.
 pub const LEAST_SHARE: f64 = 0.02;
 const MOST_PERIODS: usize = 4;
 
-/// What the profiles say of a planet.
+/// The conclusion on a planet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Finding {
-    /// Stars without a planet show such peaks too often.
+    /// The false-alarm probability is too high.
     NoPlanetNeeded,
-    /// A peak that is rare by chance, but not rare enough, or something speaks against it.
+    /// A low false-alarm probability, but not low enough for a detection, or with caveats.
     Candidate,
-    /// A peak that is very rare by chance, and nothing speaks against it.
+    /// A very low false-alarm probability, and no caveats.
     Detection,
-    /// It could not be judged.
+    /// No verdict is possible.
     NotJudged,
 }
 
 impl Finding {
-    /// Whether it is on a signal that is rare by chance.
+    /// Whether the signal has a low false-alarm probability.
     pub fn is_signal(self) -> bool {
         matches!(self, Finding::Candidate | Finding::Detection)
     }
 }
 
-/// Something that is to be said beside a result.
+/// A remark on a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Remark {
-    /// What speaks against a planet, in a few words for the verdict; `None` for what only has to be known.
+    /// A caveat in a few words for the verdict; `None` for mere information.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub against: Option<String>,
-    /// The whole sentence.
+    /// The full sentence.
     pub text: String,
 }
 
 impl Remark {
-    /// Something that speaks against a planet, in a few words, and the whole sentence.
+    /// A caveat in a few words, and the full sentence.
     pub fn against(short: impl Into<String>, text: impl Into<String>) -> Self {
         Remark { against: Some(short.into()), text: text.into() }
     }
 
-    /// Something that has to be known.
+    /// Mere information.
     pub fn note(text: impl Into<String>) -> Self {
         Remark { against: None, text: text.into() }
     }
@@ -72,7 +72,7 @@ pub struct PeriodShare {
     pub share: f64,
 }
 
-/// The orbit that is judged.
+/// The orbit of the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Signal {
     /// Period (d).
@@ -87,7 +87,7 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// The period with its error.
+    /// The period with its uncertainty.
     pub fn period(&self) -> String {
         match self.sigma_period_d {
             Some(sigma) => format!("{:.2$} ± {:.2$} d", self.period_d, sigma, decimals(sigma)),
@@ -112,7 +112,7 @@ pub fn decimals(sigma: f64) -> usize {
 /// The verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// What is found.
+    /// The conclusion.
     pub finding: Finding,
     /// The sentence that heads the result.
     pub sentence: String,
@@ -123,21 +123,21 @@ pub struct Verdict {
     pub draws: Option<usize>,
     /// The best orbit; null where there is none.
     pub signal: Option<Signal>,
-    /// What speaks against a planet, in a few words each.
+    /// Caveats, in a few words each.
     pub against: Vec<String>,
-    /// Periods with their posterior shares, the largest first, where none has all but 5 %: aliases of each other by the
-    /// sampling, or periods that the profiles do not tell apart. Empty where the period is unambiguous.
+    /// Periods with their posterior shares, the largest first, where none has 95 %: aliases of each other by the
+    /// sampling, or periods that the profiles do not resolve. Empty where the period is unambiguous.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub periods: Vec<PeriodShare>,
-    /// Of a planet of known ephemeris, of which no other period is searched.
+    /// The result for a planet of known ephemeris, for which no other period is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub known: Option<Known>,
 }
 
-/// A planet whose period and conjunction are known: K is all that is asked for.
+/// A planet whose period and conjunction are known: only K is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// K over its standard error, of a star without a planet, where K may have either sign.
+    /// K over its standard error, where K may have either sign.
     pub significance: f64,
     /// 95 % upper limit on K (km/s), for K of 0 or more.
     pub k_upper95_kms: f64,
@@ -146,18 +146,18 @@ pub struct Known {
     pub planet: Option<usize>,
 }
 
-/// Why a planet of known ephemeris is not judged.
+/// Why a planet of known ephemeris has no verdict.
 pub const UNBOUNDED: &str = "the profiles do not bound K at this ephemeris";
 
-/// The probability that a standard normal number exceeds `z`.
+/// The probability that a standard normal deviate exceeds `z`.
 pub fn one_sided(z: f64) -> f64 {
     normal::cumulative(-z)
 }
 
 impl Verdict {
-    /// Of a planet of known ephemeris, with its number (from 1) where there are several: `alone` is K with its error
-    /// where it is not in the model, `signal` where it is, and its 95 % upper limit. The false-alarm probability is
-    /// that of one period, one-sided.
+    /// The verdict on a planet of known ephemeris, with its number (from 1) where there are several: `alone` is K with
+    /// its standard error where it is not in the model, `signal` where it is, and its 95 % upper limit. The false-alarm
+    /// probability is that of one period, one-sided.
     pub fn of_known(
         planet: Option<usize>,
         alone: [f64; 2],
@@ -173,9 +173,15 @@ impl Verdict {
         Verdict::judged((one_sided(significance), None), signal, remarks, Some(known))
     }
 
+<<<<<<< HEAD
     /// Of a signal with that false-alarm probability, from that many simulations.
     pub fn new(false_alarm_probability: f64, draws: usize, signal: Signal, remarks: &[Remark]) -> Self {
         Verdict::judged((false_alarm_probability, Some(draws)), signal, remarks, None)
+=======
+    /// The verdict on a signal with that false-alarm probability.
+    pub fn new(false_alarm_probability: f64, signal: Signal, remarks: &[Remark]) -> Self {
+        Verdict::judged(false_alarm_probability, signal, remarks, None)
+>>>>>>> words
     }
 
     fn judged(
@@ -214,8 +220,8 @@ impl Verdict {
         }
     }
 
-    /// The same of a period that has these posterior shares (in any order, summing to 1 or less), in place of those it
-    /// had: a planet may be detected while its period is not.
+    /// The same with these posterior shares of periods (in any order, summing to 1 or less) in place of the former: a
+    /// planet may be detected while its period is ambiguous.
     pub fn with_periods(mut self, mut shares: Vec<PeriodShare>) -> Self {
         let (Some(probability), Some(signal)) = (self.false_alarm_probability, self.signal) else { return self };
         if self.known.is_some() {
@@ -230,7 +236,7 @@ impl Verdict {
         self
     }
 
-    /// The same with more that speaks against it: a detection becomes a candidate.
+    /// The same with additional caveats: a detection becomes a candidate.
     pub fn with(self, remarks: &[Remark]) -> Self {
         let Verdict { false_alarm_probability: Some(probability), signal: Some(signal), .. } = self else {
             return self;
@@ -240,7 +246,7 @@ impl Verdict {
         Verdict::judged((probability, self.draws), signal, &all, self.known).with_periods(self.periods)
     }
 
-    /// Where there is no judgement, and why.
+    /// No verdict, with the reason.
     pub fn not_judged(why: impl std::fmt::Display) -> Self {
         Verdict {
             finding: Finding::NotJudged,
@@ -310,10 +316,15 @@ fn caveats(against: &[String]) -> String {
     if against.is_empty() { String::new() } else { format!(" Caveats: {}.", against.join("; ")) }
 }
 
+<<<<<<< HEAD
 /// Simulations of a search whose file does not have their number.
 pub fn usual_draws() -> usize {
     10_000
 }
+=======
+/// Below this a false-alarm probability is extrapolated beyond the simulations.
+pub const SIMULATED_FAP: f64 = 1e-4;
+>>>>>>> words
 
 fn chance(p: f64, draws: Option<usize>) -> String {
     false_alarm(p, draws.unwrap_or_else(usual_draws))
@@ -335,7 +346,7 @@ pub fn false_alarm(p: f64, draws: usize) -> String {
     }
 }
 
-/// What a velocity (km/s) is multiplied by to be printed, and its unit then.
+/// Factor of a velocity (km/s) for printing, and the unit.
 fn unit(kms: f64) -> (f64, &'static str) {
     if kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") }
 }
@@ -347,10 +358,10 @@ pub fn speed(kms: f64, sigma_kms: f64) -> String {
     format!("{:.digits$} {unit}", factor * kms)
 }
 
-/// A probability as it is written everywhere.
+/// The printed form of a probability.
 pub fn probability(p: f64) -> String {
     match p {
-        // what is smaller is no double any more
+        // smaller values underflow a double
         0.0 => "< 1e-300".to_owned(),
         p if p >= 0.1 => format!("{p:.2}"),
         p if p >= 1e-3 => format!("{p:.4}"),

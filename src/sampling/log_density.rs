@@ -1,8 +1,7 @@
-//! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few named
-//! numbers out.
+//! The interface between sampler and star: a vector of parameters in, a log-probability and a few named numbers out.
 //!
-//! The ensemble, the optimiser and the landscape know only this file; the density of a surface model implements it.
-//! Batches go through [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
+//! The ensemble, the optimiser and the likelihood grid depend only on this file; the density of a surface model
+//! implements it. Batches are evaluated by an [`Evaluator`], on the threads of one machine or the ranks of a cluster.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -13,13 +12,13 @@ use serde::{Deserialize, Serialize};
 pub enum Status {
     /// The reconstruction met its tolerances.
     Converged,
-    /// The target chi2 is out of reach at these parameters; the log-probability is the monotone continuation.
+    /// The target chi2 cannot be reached at these parameters; the log-probability is the monotone continuation.
     Unreachable,
     /// Outside the prior: nothing was reconstructed and the log-probability is minus infinity.
     OutsidePrior,
     /// The reconstruction stopped short of its tolerances; rejected and counted as a failure.
     StoppedShort,
-    /// A number that is not finite appeared; rejected and counted as a failure.
+    /// A non-finite number appeared; rejected and counted as a failure.
     NonFinite,
 }
 
@@ -30,28 +29,28 @@ impl Status {
     }
 }
 
-/// What one evaluation returns.
+/// The result of one evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
-    /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named, in a landscape ln(likelihood) alone;
-    /// minus infinity where not allowed, or failed.
+    /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named, in a likelihood grid ln(likelihood)
+    /// only; minus infinity where not allowed, or failed.
     pub log_prob: f64,
-    /// Numbers beside it, in the order of their names ([`LogDensity::number_names`]); none where it is minus infinity.
+    /// Other values, in the order of their names ([`LogDensity::number_names`]); none where it is minus infinity.
     pub numbers: Vec<f64>,
-    /// Applications of the model or its transpose that this evaluation took.
+    /// Applications of the model or its transpose in this evaluation.
     pub model_applications: u32,
     /// How it ended.
     pub status: Status,
 }
 
 impl Evaluation {
-    /// A log-probability alone.
+    /// A log-probability without other values.
     pub fn of(log_prob: f64) -> Self {
         let status = if log_prob.is_nan() { Status::NonFinite } else { Status::Converged };
         Evaluation { log_prob, ..Evaluation::rejected(status) }
     }
 
-    /// An evaluation that came to nothing: log-probability minus infinity, no numbers.
+    /// A failed evaluation: log-probability minus infinity, no numbers.
     pub fn rejected(status: Status) -> Self {
         Evaluation { log_prob: f64::NEG_INFINITY, numbers: Vec::new(), model_applications: 0, status }
     }
@@ -70,8 +69,7 @@ pub trait LogDensity: Sync {
     /// Names of the parameters, in the order of every vector.
     fn names(&self) -> &[String];
 
-    /// Names of the numbers that an evaluation has beside its log-probability, in their order. They are kept with every
-    /// draw of a chain.
+    /// Names of the other values of an evaluation, in order. They are kept with every draw of a chain.
     fn number_names(&self) -> &[&str] {
         &[]
     }
@@ -90,32 +88,32 @@ pub trait LogDensity: Sync {
         x.to_vec()
     }
 
-    /// ln |d(physical) / d(sampling)| at `theta`: what turns a density in physical coordinates into one in sampling
+    /// ln |d(physical) / d(sampling)| at `theta`: the factor from a density in physical coordinates to one in sampling
     /// ones.
     fn log_jacobian(&self, _theta: &[f64]) -> f64 {
         0.0
     }
 }
 
-/// A density whose gradient comes at the price of a few forward models.
+/// A density whose gradient costs only a few forward models.
 pub trait Gradient: LogDensity {
     /// The evaluation at `theta`, and the gradient of its log-probability with respect to the sampling coordinates
     /// (empty where the log-probability is minus infinity).
     fn evaluate_with_gradient(&self, theta: &[f64]) -> (Evaluation, Vec<f64>);
 
-    /// Natural steps of the sampling coordinates: what a search is scaled with.
+    /// Natural steps of the sampling coordinates: the scale of a search.
     fn scales(&self) -> Vec<f64>;
 
-    /// Where the density of each sampling coordinate alone ends, in those coordinates; infinite where it does not.
+    /// Bounds of the density in each sampling coordinate, in those coordinates; infinite where unbounded.
     fn bounds(&self) -> Vec<(f64, f64)>;
 }
 
-/// Evaluates a batch of parameter vectors; the order of the answers is the order of the questions.
+/// Evaluates a batch of parameter vectors; results are in the order of the vectors.
 pub trait Evaluator {
-    /// One evaluation a vector; or fewer, those of the first vectors, where it was told to stop meanwhile.
+    /// One evaluation per vector; or fewer, those of the first vectors, if a stop was requested meanwhile.
     fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation>;
 
-    /// Counts evaluations that are made elsewhere: before they are, whether to go on.
+    /// Counts evaluations made elsewhere; asked before each whether to continue.
     fn goes_on(&self, _evaluations: usize) -> bool {
         true
     }

@@ -1,9 +1,9 @@
-//! Log-probabilities go in, chains come out. Nothing here knows what the parameters mean.
+//! From log-probabilities to chains, independent of the meaning of the parameters.
 //!
-//! 1. [`log_density`] is what is sampled: a vector of parameters to a log-probability with what it cost.
+//! 1. [`log_density`] is the sampled function: from a vector of parameters to a log-probability with its cost.
 //! 2. [`optimise`] finds its maximum.
-//! 3. [`ensemble`] walks over it: `start`, then steps of `sampler` by proposals of `moves`, until `stop`.
-//! 4. [`chain`] keeps the walk and summarises it.
+//! 3. [`ensemble`] samples it: `start`, then steps of `sampler` by proposals of `moves`, until `stop`.
+//! 4. [`chain`] stores and summarises the samples.
 //!
 //! [`landscape`] is the same density on a grid. A new move is a file of `ensemble/moves`, whose `mod.rs` lists what it
 //! needs.

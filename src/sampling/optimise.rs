@@ -1,8 +1,8 @@
 //! The maximum of a log-density and its curvature: a trust-region Newton method (argmin; Nocedal & Wright 2006, chapter
-//! 4) in scaled sampling coordinates, with Hessians from differences of gradients. A coordinate that is pressed against
-//! its bound is held there, while the others go on.
+//! 4) in scaled sampling coordinates, with Hessians from differences of gradients. A coordinate at its bound is fixed
+//! there, while the others continue.
 //!
-//! Knows densities through [`Gradient`] alone.
+//! Depends only on [`Gradient`].
 
 use crate::numerics::once;
 use crate::sampling::log_density::{Evaluation, Gradient};
@@ -27,8 +27,7 @@ pub struct Optimum {
     pub evaluation: Evaluation,
     /// Minus the Hessian of the log-probability in sampling coordinates.
     pub curvature: Matrix,
-    /// Inverse of the curvature. Directions that the data leave open (curvature not positive) get a large variance
-    /// instead.
+    /// Inverse of the curvature. Unconstrained directions (curvature not positive) get a large variance instead.
     pub covariance: Matrix,
     /// The covariance in physical coordinates, to first order.
     pub written_covariance: Matrix,
@@ -36,34 +35,33 @@ pub struct Optimum {
     pub well_defined: bool,
     /// Whether the search met its tolerance.
     pub converged: bool,
-    /// Evaluations of the density, those for gradients included.
+    /// Evaluations of the density, including those for gradients.
     pub evaluations: usize,
     /// Trust-region steps.
     pub iterations: u64,
 }
 
-/// Why a search found nothing.
+/// Why a search failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OptimiseError {
     /// The density is zero where the search starts.
     #[error("the log-probability at the start is minus infinity ({0:?})")]
     Start(crate::sampling::log_density::Status),
-    /// The optimiser itself gave up.
+    /// The optimiser itself failed.
     #[error("the optimiser stopped: {0}")]
     Solver(String),
 }
 
-/// Most trust-region steps of a search.
+/// Largest number of trust-region steps.
 const ITERATIONS: u64 = 25;
 
 /// A search ends when a Newton step would gain less than this in log-probability.
 const GAIN: f64 = 2e-3;
 
-/// Differences of gradients step by this share of a coordinate's natural scale.
+/// Step of differences of gradients, in natural scales of the coordinate.
 const HESSIAN_STEP: f64 = 0.25;
 
-/// Directions in which the curvature is less than this, in units of 1 / (natural scale)^2, count as left open by the
-/// data.
+/// Directions in which the curvature is less than this, in units of 1 / (natural scale)^2, count as unconstrained.
 const OPEN_CURVATURE: f64 = 1e-3;
 
 /// Climbs from `start` (physical coordinates) to a local maximum of `density`; `tick` is called at every evaluation.
@@ -94,7 +92,7 @@ pub fn climb<D: Gradient>(density: &D, start: &[f64], tick: &(dyn Fn() + Sync)) 
     let (Some(x), Some(hessian)) = (state.get_param(), state.get_hessian()) else {
         return Err(OptimiseError::Solver("no point was kept".into()));
     };
-    // that of coordinates on their bounds as if they were not held
+    // including coordinates on their bounds, as if free
     let hessian = &if landscape.on_bounds(x) { landscape.bend(x) } else { hessian.clone() };
     let theta = landscape.written(x);
     let covariance = bounded_inverse(hessian);
@@ -130,7 +128,7 @@ fn bounded_inverse(hessian: &Matrix) -> Matrix {
     symmetric(&(&eigen.eigenvectors * Matrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()))
 }
 
-/// Minus the log-density over scaled sampling coordinates, as argmin sees it.
+/// Minus the log-density over scaled sampling coordinates, for argmin.
 struct Landscape<'a, D: Gradient> {
     density: &'a D,
     scales: Vec<f64>,
@@ -155,7 +153,7 @@ impl<D: Gradient> Landscape<'_, D> {
         Vector::from_iterator(theta.len(), internal.iter().zip(&self.scales).map(|(x, s)| x / s))
     }
 
-    /// The point within the bounds that is nearest.
+    /// The nearest point within the bounds.
     fn inside(&self, x: &Vector) -> Vector {
         Vector::from_iterator(x.len(), x.iter().zip(&self.bounds).map(|(x, (low, high))| x.clamp(*low, *high)))
     }
@@ -171,7 +169,7 @@ impl<D: Gradient> Landscape<'_, D> {
         (x[j] <= low && slope[j] > 0.0) || (x[j] >= high && slope[j] < 0.0)
     }
 
-    /// Of the point within the bounds that is nearest.
+    /// The cost at the nearest point within the bounds.
     fn written(&self, x: &Vector) -> Vec<f64> {
         let internal: Vec<f64> = self.inside(x).iter().zip(&self.scales).map(|(x, s)| x * s).collect();
         self.density.to_physical(&internal)
@@ -224,7 +222,7 @@ impl<D: Gradient> Landscape<'_, D> {
             };
             for (i, (plus, minus)) in shifted(h).into_iter().zip(shifted(-h)).enumerate() {
                 let difference = plus - minus;
-                // only a coordinate of period 1 can jump that far
+                // only a coordinate of period 1 can change that much
                 let wrapped = if difference.abs() > 0.5 { difference - difference.round() } else { difference };
                 jacobian[(i, j)] = wrapped / (2.0 * h);
             }
@@ -267,7 +265,7 @@ impl<D: Gradient> Hessian for &Landscape<'_, D> {
     }
 }
 
-/// argmin's trust region, with an end: it stops when the predicted gain is negligible.
+/// argmin's trust region with a stopping criterion: it stops when the predicted gain is negligible.
 #[derive(Clone)]
 struct Patient<S>(S);
 
@@ -354,7 +352,7 @@ mod tests {
         assert!((optimum.covariance[(1, 1)] - 4.25).abs() < 1.0);
     }
 
-    /// From the bound, from inside, and where the way leads along the bound and off it again.
+    /// From the bound, from inside, and where the path follows the bound and leaves it again.
     #[test]
     fn what_is_pressed_against_a_bound_is_held_there_while_the_rest_goes_on() {
         let density = Rosenbrock(vec!["a".into(), "b".into()], [OPEN, (-1.0, 0.25)]);

@@ -1,14 +1,13 @@
-//! Pairs of a visible pixel and an observation as the hot path reads them: a pixel of each of several cells side by
-//! side.
+//! Memory layout of pairs of a visible pixel and an observation for the hot path: blocks of one pixel of each of
+//! several cells.
 //!
-//! Which pixels they are, and what is seen of them, are kept apart: stars that differ little have the same pixels in
-//! their cells.
+//! Indices of pixels and their moments are separate: stars that differ little have the same pixels in their cells.
 
-/// Cells side by side: as many as the widest registers hold in double precision.
+/// Cells per block: as many as the widest registers hold in double precision.
 pub const LANES: usize = 8;
 
-/// What is seen of a pixel of each cell; a cell that has no pixel left has one of weight 0, and the cells after it have
-/// none either.
+/// Moments of one pixel of each cell; a cell without further pixels has one of weight 0, and so have the cells after
+/// it.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
 pub struct Block {
@@ -23,13 +22,13 @@ pub struct Block {
 /// Index of a pixel of each cell.
 pub type Pixels = [u32; LANES];
 
-/// Cells side by side, with their pixels.
+/// A group of cells, with their pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Group<'a> {
     /// First node of each cell.
     pub cells: &'a [u32; LANES],
-    /// What is seen, ...
+    /// Moments, ...
     pub blocks: &'a [Block],
-    /// ... and of which pixels.
+    /// ... and indices of pixels.
     pub pixels: &'a [Pixels],
 }

@@ -1,4 +1,4 @@
-//! What a map of the star holds, and how bright it makes a pixel (`docs/method.md` section 1).
+//! The content of a map of the star, and the brightness of a pixel (`docs/method.md` section 1).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ impl BrightnessModel {
     }
 }
 
-/// Brightness of a pixel, that of the photosphere being 1, as an affine function of what a map holds there.
+/// Brightness of a pixel, that of the photosphere being 1, as an affine function of the map's value there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brightness {
     /// Where the map holds 0.

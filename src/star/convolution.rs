@@ -1,14 +1,14 @@
 //! From the velocity grid to the bins of each observed profile: convolution with the local line, and its transpose.
 //!
 //! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the
-//! grid is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters.
+//! grid is turned into bins by one short filter per row. The orbit and the systemic velocity only shift the filters.
 
 use super::correlate::{self, CHUNK, correlate};
 use super::line_profile::LineKernel;
 use crate::numerics::vector::Instructions;
 use std::ops::Range;
 
-/// The velocity grid, as far as filters need to know it.
+/// The properties of the velocity grid for filters.
 #[derive(Clone, Copy, Debug)]
 pub struct VelocityGrid {
     /// Number of nodes.
@@ -35,16 +35,15 @@ pub struct Convolutions {
 #[derive(Clone, Debug)]
 struct Filter {
     first: isize,
-    /// Where its taps are.
+    /// The range of its taps.
     taps: Range<usize>,
 }
 
 impl Convolutions {
-    /// For profiles the first bins of which lie so far (km/s) above the grid's first node, in the star's frame, with
-    /// their numbers of bins.
+    /// For profiles given by the distance (km/s) of their first bin above the grid's first node, in the star's frame,
+    /// and their numbers of bins.
     ///
-    /// Left out of the filters are nodes that lie beyond the grid for every bin, however far a profile is from the
-    /// grid.
+    /// Taps that lie beyond the grid for every bin are left out of the filters.
     pub fn new(kernel: &LineKernel, grid: VelocityGrid, profiles: impl Iterator<Item = (f64, usize)>) -> Self {
         let VelocityGrid { nodes, step_kms, steps_per_bin } = grid;
         let reach = kernel.reach_kms() / step_kms;
@@ -77,7 +76,7 @@ impl Convolutions {
         &self.reversed[self.taps.len() - taps.end..self.taps.len() - taps.start]
     }
 
-    /// Rows for profiles of at most so many bins.
+    /// Rows for profiles of at most this many bins.
     pub fn rows(&self, bins: usize) -> Rows {
         let VelocityGrid { nodes, steps_per_bin, .. } = self.grid;
         // columns before the first, and those from the first on that filters reach

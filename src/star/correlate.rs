@@ -16,7 +16,7 @@ pub fn correlate(i: impl Instructions, taps: &[f64], source: &[f64], sums: &mut 
     }
 }
 
-/// Puts the results of a chunk where they belong; the last chunk may be shorter.
+/// Stores the results of a chunk; the last chunk may be shorter.
 #[inline(always)]
 pub fn put(sums: &[f64; CHUNK], chunk: &mut [f64]) {
     match <&mut [f64; CHUNK]>::try_from(&mut *chunk) {

@@ -1,9 +1,9 @@
 //! Brightness deposited on a velocity grid, for every observation, and its transpose. This is the hot path.
 //!
-//! Every visible (pixel, observation) pair lies in one cell of a uniform velocity grid. The pairs of a cell follow each
-//! other, so that the sum over them is one of powers of the position within the cell (`kernel`); the cell's polynomials
-//! (`line_profile`) make node values of them, whatever the shape and width of the line. The pairs depend on the star's
-//! rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
+//! Every visible (pixel, observation) pair lies in one cell of a uniform velocity grid. The pairs of a cell are
+//! contiguous, and are summed as powers of the position within the cell (`kernel`); the cell's polynomials
+//! (`line_profile`) convert these sums to node values, whatever the shape and width of the line. The pairs depend only
+//! on the star's rotation, inclination and vsini; an orbit or a systemic velocity does not change them.
 
 use super::StarState;
 use super::exposure::Exposure;
@@ -30,19 +30,19 @@ pub struct Deposit {
     looks: Looks,
 }
 
-/// When the star is looked at: once a profile, or several times in its exposure.
+/// The sampling times of the star: once per profile, or several times in its exposure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Looks {
     /// Times since the star's epoch (d), of one profile after another.
     pub since_epoch_d: Vec<f64>,
-    /// What each counts in its profile.
+    /// Weight of each in its profile.
     weights: Vec<f64>,
-    /// First look of each profile, and the end; empty where each profile has one.
+    /// First sample of each profile, and the end; empty where each profile has one.
     starts: Vec<usize>,
 }
 
 impl Looks {
-    /// At profiles that are taken at these times since the star's epoch (d); without exposures, at instants.
+    /// For profiles at these times since the star's epoch (d); without exposures, at instants.
     pub fn new(since_epoch_d: impl Iterator<Item = f64>, exposures: &[Exposure]) -> Self {
         if exposures.is_empty() {
             return Looks { since_epoch_d: since_epoch_d.collect(), weights: Vec::new(), starts: Vec::new() };
@@ -58,7 +58,7 @@ impl Looks {
         looks
     }
 
-    /// The looks of profile `k`, with their weights.
+    /// The samples of profile `k`, with their weights.
     #[inline(always)]
     fn of(&self, k: usize) -> impl Iterator<Item = (usize, f64)> {
         let looks = if self.starts.is_empty() { k..k + 1 } else { self.starts[k]..self.starts[k + 1] };
@@ -66,8 +66,8 @@ impl Looks {
     }
 }
 
-/// Pixels in their cells, for deposits of several stars. They may be outside of them for any but the one that it was
-/// made for.
+/// Pixels in their cells, for deposits of several stars. For other stars than the original one they may be outside of
+/// their cells.
 #[derive(Clone, Debug)]
 pub struct Arranged {
     /// Step of the grid (km/s).
@@ -78,7 +78,7 @@ pub struct Arranged {
     source: Source,
 }
 
-/// A star as it is observed.
+/// A star with its observations.
 pub struct Observed<'a> {
     /// Its pixels.
     pub grid: &'a SurfaceGrid,
@@ -86,11 +86,11 @@ pub struct Observed<'a> {
     pub state: &'a StarState,
     /// Limb darkening.
     pub limb: LimbDarkening,
-    /// Whether pixels are weighted by `1 - mu`, too.
+    /// Whether pixels are also weighted by `1 - mu`.
     pub limb_alone: bool,
-    /// When it is looked at.
+    /// Sampling times.
     pub looks: Looks,
-    /// Step (km/s) of the velocity grid that its line takes.
+    /// Step (km/s) of the velocity grid for its line.
     pub step_kms: f64,
 }
 
@@ -100,11 +100,11 @@ impl Deposit {
         Deposit::sorted(star, 0.0, false).0
     }
 
-    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are
-    /// to be seen again.
+    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and their origin, if they are to be
+    /// updated.
     fn sorted(star: &Observed, margin: f64, again: bool) -> (Self, Option<Source>) {
         let &Observed { grid, state, limb, limb_alone, ref looks, step_kms } = star;
-        // what is said of pixels below holds for these
+        // the statements on pixels below hold for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
         let order = match grid.len() {
             pixels if pixels <= MEDIUM_MAP => Order::BySize,
@@ -126,7 +126,7 @@ impl Deposit {
         -((self.nodes / 2) as f64) * self.step_kms
     }
 
-    /// Number of nodes in steps of `step_kms` that a state takes.
+    /// Number of nodes in steps of `step_kms` for a state.
     pub fn nodes_at(state: &StarState, limb: LimbDarkening, step_kms: f64) -> f64 {
         2.0 * reach(&Viewer::new(state, limb, false, step_kms)) + 1.0
     }
@@ -146,8 +146,8 @@ impl Deposit {
         self.pixels
     }
 
-    /// Deposits map `x` (one number a pixel) as profile `k` sees it on the velocity grid (overwritten). What cells
-    /// leave on each of their nodes is kept in `left`, which is empty at first.
+    /// Deposits map `x` (one number per pixel) for profile `k` on the velocity grid (overwritten). Contributions of
+    /// cells to each of their nodes are stored in `left`, which is empty at first.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn gather<N: Number>(&self, i: impl Instructions, k: usize, x: &[N], left: &mut Vec<N>, nodes: &mut [f64]) {
@@ -157,7 +157,7 @@ impl Deposit {
         nodes.fill(0.0);
         for (look, weight) in self.looks.of(k) {
             for group in self.placement.groups_of(look) {
-                // safe: groups hold pixels of the grid alone, and its cells
+                // safe: groups contain only pixels and cells of the grid
                 unsafe { kernel::gather(N::registers(i), group, x, left) };
             }
             for two in left.chunks_exact(2 * self.nodes) {
@@ -168,7 +168,7 @@ impl Deposit {
         }
     }
 
-    /// Transpose of [`Deposit::gather`]: adds to map `out` what profile `k` gives back from the grid `nodes`.
+    /// Transpose of [`Deposit::gather`]: adds to map `out` the contribution of profile `k` from the grid `nodes`.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn scatter<N: Number>(&self, i: impl Instructions, k: usize, nodes: &[N], out: &mut [N]) {
@@ -191,7 +191,7 @@ impl Deposit {
 }
 
 impl Arranged {
-    /// Pixels as those of a star are seen, with a margin (rad) beyond the limb.
+    /// Arranges pixels as seen for a star, with a margin (rad) beyond the limb.
     pub fn new(star: &Observed, margin: f64) -> Self {
         let (deposit, source) = Deposit::sorted(star, margin, true);
         let Deposit { step_kms, nodes, pixels, ref placement, .. } = deposit;
@@ -199,7 +199,7 @@ impl Arranged {
         Arranged { step_kms, nodes, pixels, arrangement, source: source.expect("asked for") }
     }
 
-    /// Deposits of the same pixels as those of another star are seen at the same times, on the same grid.
+    /// Deposits of the same pixels for another star at the same times, on the same grid.
     pub fn deposit(&self, star: &Observed) -> Deposit {
         let &Arranged { step_kms, nodes, pixels, ref arrangement, ref source } = self;
         let &Observed { grid, state, limb, limb_alone, ref looks, .. } = star;
@@ -210,11 +210,11 @@ impl Arranged {
     }
 }
 
-/// Up to so many pixels a cell has few, and a pass takes a tenth longer in the order of velocities (5,000 pixels, in
-/// double precision); ...
+/// Up to this many pixels cells have few of them, and a pass takes a tenth longer in the order of velocities (5,000
+/// pixels, in double precision); ...
 const MEDIUM_MAP: usize = 12_000;
 
-/// ... up to so many it takes a tenth less (20,000), and beyond it pixels of one cell should follow each other: another
+/// ... up to this many it takes a tenth less (20,000), and beyond it pixels of one cell should be contiguous: another
 /// tenth (80,000).
 const LARGE_MAP: usize = 40_000;
 

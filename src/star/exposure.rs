@@ -1,9 +1,9 @@
-//! How long a profile is exposed, while rotation moves what it shows: its mean over the exposure, by Gauss-Legendre
-//! quadrature. Line and continuum are averaged each for itself, as light adds up, so that the response stays linear in
-//! the map (`docs/method.md` section 1).
+//! Exposure times: the mean of a profile over its exposure, in which the star rotates, by Gauss-Legendre quadrature.
+//! Line and continuum are averaged separately, as fluxes add, so that the response stays linear in the map
+//! (`docs/method.md` section 1).
 //!
-//! Left out: what the orbit moves meanwhile (the profile has the velocity of mid-exposure, off by `(pi T / Porb)^2 / 6`
-//! of K), and the evolution of spots.
+//! Neglected: the change of the orbital velocity (the profile has that of mid-exposure, off by `(pi T / Porb)^2 / 6` of
+//! K), and the evolution of spots.
 
 use std::f64::consts::PI;
 
@@ -18,11 +18,11 @@ pub const LONGEST_ROTATIONS: f64 = 0.1;
 pub struct Exposure {
     /// Its length (d).
     pub length_d: f64,
-    /// At how many times the star is looked at; 1 for an instant.
+    /// Number of samples; 1 for an instant.
     pub looks: usize,
 }
 
-/// How fast rotation smears a line, and how finely that matters.
+/// Rotational smearing of a line, with the scales to compare it with.
 #[derive(Clone, Copy, Debug)]
 pub struct Smearing {
     /// Projected equatorial velocity (km/s).
@@ -36,12 +36,12 @@ pub struct Smearing {
 }
 
 impl Smearing {
-    /// How far (km/s) a feature at the centre of the disc moves in this time (d).
+    /// Velocity change (km/s) of a feature at the centre of the disc in this time (d).
     fn shift_kms(&self, length_d: f64) -> f64 {
         self.vsini_kms.abs() * self.omega_eq_rad_d.abs() * length_d
     }
 
-    /// An exposure of this length (d): one look more than it moves a feature by standard deviations of the line, which
+    /// An exposure of this length (d): one sample more than the smearing in standard deviations of the line, which
     /// keeps the profile of a point to 1e-3 of its depth; an instant where it moves less than a tenth of a bin.
     pub fn exposure(&self, length_d: f64) -> Exposure {
         let shift_kms = self.shift_kms(length_d);
@@ -57,7 +57,7 @@ impl Exposure {
     /// An instant.
     pub const INSTANT: Exposure = Exposure { length_d: 0.0, looks: 1 };
 
-    /// Times from its middle (d) at which the star is looked at, and their weights, which add up to 1.
+    /// Sampling times from its middle (d), and their weights, which sum to 1.
     pub fn looks(&self) -> Vec<(f64, f64)> {
         match self.looks {
             0 | 1 => vec![(0.0, 1.0)],
@@ -66,7 +66,7 @@ impl Exposure {
     }
 }
 
-/// Nodes in [-1, 1] and weights that add up to 1, exact for polynomials of degree `2 n - 1`.
+/// Nodes in [-1, 1] and weights that sum to 1, exact for polynomials of degree `2 n - 1`.
 fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     // Newton's method from Tricomi's estimate converges in a few steps
     const STEPS: usize = 20;

@@ -1,9 +1,9 @@
-//! Fills blocks with what is seen of the pixels that stand there; and does it again for a star that differs little,
-//! without sorting its pixels, which is half of what a placement takes.
+//! Fills blocks with the moments of their pixels; and again for a star that differs little, without sorting its pixels,
+//! which saves half of the time of a placement.
 //!
-//! A pixel may be outside of its cell then: the polynomials that say what it leaves on the cell's nodes
-//! (`line_profile`) go on beyond the border, and differ from those of the next cell by the fifth power of the way,
-//! those of its spread by the third.
+//! A pixel may be outside of its cell then: the polynomials of its contributions to the cell's nodes (`line_profile`)
+//! continue beyond the border, and differ from those of the next cell by the fifth power of the distance, those of its
+//! spread by the third.
 
 use super::block::{Block, LANES};
 use super::grid::SurfaceGrid;
@@ -13,7 +13,7 @@ use super::view::{Part, Seen, Viewer};
 use crate::numerics::vector::{Instructions, Registers, Scattered, Task};
 use std::sync::Arc;
 
-/// Which of the pixels that an observation sees are in the lanes of a block.
+/// Indices of the visible pixels of an observation in the lanes of a block.
 pub type Seats = [u32; LANES];
 
 /// Fills an observation's blocks.
@@ -26,7 +26,7 @@ pub unsafe fn fill<I: Instructions>(i: I, seats: &[Seats], seen: &Seen, blocks: 
     let r = i.singles();
     for (seats, Block { weight, position, spread }) in seats.iter().zip(blocks) {
         for first in (0..LANES).step_by(I::Singles::LANES) {
-            // safe: the caller knows the seats
+            // safe: the caller guarantees the seats
             unsafe {
                 let weights = r.pick(&seen.weight, seats, first);
                 let positions = r.pick(&seen.position, seats, first);
@@ -39,16 +39,16 @@ pub unsafe fn fill<I: Instructions>(i: I, seats: &[Seats], seen: &Seen, blocks: 
     }
 }
 
-/// Where the pixels of an arrangement come from.
+/// The origin of the pixels of an arrangement.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// Rings of the map that are looked at.
+    /// Rings of the map in use.
     rings: Vec<usize>,
-    /// The pixels as they are looked at, of one observation after another.
+    /// The parts of rings in view, of one observation after another.
     parts: Vec<Part>,
     /// Middles of the cells of their pixels (steps).
     middles: Vec<f32>,
-    /// Who sits in each block.
+    /// The pixels of each block.
     seats: Vec<Seats>,
     observations: Vec<Observation>,
 }
@@ -62,13 +62,13 @@ struct Observation {
 }
 
 impl Source {
-    /// One without any observation.
+    /// An empty one.
     pub fn new(rings: &[usize]) -> Self {
         let (parts, middles, seats, observations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Source { rings: rings.to_vec(), parts, middles, seats, observations }
     }
 
-    /// Adds an observation: its pixels in `parts`, and who sits in its blocks.
+    /// Adds an observation: its pixels in `parts`, and the pixels of its blocks.
     pub fn add(&mut self, parts: &[Part], seen: &Seen, seats: &[Seats]) {
         self.parts.extend_from_slice(parts);
         self.middles.truncate(self.observations.last().map_or(0, |last| last.pixels_end));
@@ -83,11 +83,11 @@ impl Source {
 pub struct Refill<'a> {
     /// The pixels.
     pub grid: &'a SurfaceGrid,
-    /// Who looks at them.
+    /// The view of the observer.
     pub viewer: Viewer,
-    /// Which stand where, ...
+    /// Their arrangement, ...
     pub arrangement: &'a Arc<Arrangement>,
-    /// ... and where they come from.
+    /// ... and their origin.
     pub source: &'a Source,
     /// Times of the observations since the star's epoch (d).
     pub since_epoch_d: &'a [f64],
@@ -122,7 +122,7 @@ impl Refill<'_> {
             let (pixels, middles) = (end.pixels_end - begin.pixels_end, &source.middles[begin.pixels_end..]);
             views.look(instructions, parts, pixels, Some(middles), &mut seen);
             let rows = begin.blocks_end..end.blocks_end;
-            // safe: as when they were sorted: as many pixels are seen
+            // safe: as many pixels are visible as when they were sorted
             #[allow(unsafe_code)]
             unsafe {
                 fill(instructions, &source.seats[rows.clone()], &seen, &mut blocks[rows]);

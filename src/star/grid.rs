@@ -1,4 +1,4 @@
-//! The stellar surface in pixels of equal area, and the points inside a pixel at which it is looked at.
+//! The stellar surface in pixels of equal area, and the evaluation points inside a pixel.
 //!
 //! Rings of constant latitude hold a number of pixels proportional to the cosine of the latitude; the latitudes of
 //! their borders are then set so that every pixel has the same area. A pixel is evaluated at its centre or, to match
@@ -13,7 +13,7 @@ use std::ops::Range;
 pub enum Quadrature {
     /// At its centre: errors of order (pixel size)^2.
     Centre,
-    /// At 2 x 2 Gauss points, whose moments stand for the whole pixel.
+    /// At 2 x 2 Gauss points, whose moments represent the whole pixel.
     Gauss2x2,
 }
 
@@ -26,7 +26,7 @@ pub struct RingPoint {
     pub cos_latitude: f64,
     /// Its longitude minus that of the pixel's centre (rad).
     pub longitude_offset: f64,
-    /// Area fraction of the star that it stands for.
+    /// Area fraction of the star that it represents.
     pub area: f64,
 }
 
@@ -143,7 +143,7 @@ impl SurfaceGrid {
         self.rings.first().map_or(1, |ring| ring.points.len())
     }
 
-    /// Whether there is no pixel.
+    /// Whether it has no pixel.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
     }

@@ -1,12 +1,11 @@
-//! Observed profiles with the orbit of a planet put into them: each is shifted by the orbit's velocity at its time and
-//! resampled on the velocity axis that it had. Relabelling the axis instead would leave the noise where it was in the
-//! bins.
+//! Injection of a planet's orbit into observed profiles: each is shifted by the orbit's velocity at its time and
+//! resampled on its original velocity axis. Relabelling the axis instead would leave the noise of the bins unshifted.
 //!
-//! The interpolation is band-limited: a sinc in a Kaiser window (Kaiser & Schafer 1980) of 16 bins to either side. Of a
-//! line as broad as the spectrograph makes it, 3 km/s in bins of 1.8, it loses 1e-5 of the depth. White noise stays
-//! nearly white: half way between two bins, the worst case, its variance is 0.93 of what it was and neighbours
-//! correlate by 0.07 (a cubic spline: 0.76 and 0.26). Beyond the ends of a profile the continuum goes on flat, as the
-//! mean of its last bins. Errors travel along, unsmoothed.
+//! The interpolation is band-limited: a sinc in a Kaiser window (Kaiser & Schafer 1980) of 16 bins to either side. For
+//! an unresolved line, 3 km/s wide in bins of 1.8, the error is 1e-5 of the depth. White noise stays nearly white: half
+//! way between two bins, the worst case, its variance is 0.93 of the original and neighbours correlate by 0.07 (a cubic
+//! spline: 0.76 and 0.26). Beyond the ends of a profile the continuum is the mean of its last bins. Uncertainties are
+//! shifted along, unsmoothed.
 
 use crate::star::observation::{Observations, Profile};
 use crate::star::{Orbit, StarSettings};
@@ -15,13 +14,13 @@ use std::f64::consts::PI;
 /// Half the width of the interpolation (bins).
 const REACH: isize = 16;
 
-/// Shape of the Kaiser window: what it lets through beyond the band is below 1e-5.
+/// Shape of the Kaiser window: its leakage beyond the band is below 1e-5.
 const KAISER: f64 = 10.0;
 
-/// Bins at either end whose mean the continuum goes on with.
+/// Bins at either end whose mean extends the continuum.
 const END: usize = 4;
 
-/// `observations` with the velocities of all `orbits` added to every profile's own.
+/// `observations` with the velocities of all `orbits` added to those of every profile.
 pub fn inject(observations: &Observations, star: &StarSettings, orbits: &[Orbit]) -> Observations {
     let velocity = |profile: &Profile| {
         let cycle = star.cycle(profile.time_d);
@@ -31,7 +30,7 @@ pub fn inject(observations: &Observations, star: &StarSettings, orbits: &[Orbit]
     Observations { profiles }
 }
 
-/// `profile` with its line `velocity_kms` further to the red.
+/// `profile` with its line shifted by `velocity_kms` to the red.
 pub fn shifted(profile: &Profile, velocity_kms: f64) -> Profile {
     let bins = velocity_kms / profile.step_kms;
     let variance: Vec<f64> = profile.sigma.iter().map(|sigma| sigma * sigma).collect();
@@ -64,7 +63,7 @@ fn resampled(values: &[f64], bins: f64) -> Vec<f64> {
     (0..values.len()).map(value).collect()
 }
 
-/// The same between the two nearest bins, the last ones going on.
+/// The same by linear interpolation, with the last bins extended.
 fn linear(values: &[f64], bins: f64) -> Vec<f64> {
     let last = (values.len() - 1) as f64;
     let value = |j: usize| {
@@ -136,7 +135,7 @@ mod tests {
         assert!(apart(&shifted(&shifted(&still, 0.7), -0.7), &still) < 6e-6);
     }
 
-    /// The numbers that the documentation gives.
+    /// The values in the documentation.
     #[test]
     fn white_noise_stays_nearly_white() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -4,14 +4,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Newton steps at most; from this start a few do.
+/// Largest number of Newton steps; from this start a few are enough.
 const STEPS: usize = 50;
 
 /// The eccentric anomaly E of a mean anomaly (radians), `E - e sin E = M`, for `0 <= e < 1`; in the same turn as M.
 pub fn eccentric_anomaly(mean_anomaly: f64, e: f64) -> f64 {
     let m = (mean_anomaly + PI).rem_euclid(TAU) - PI;
-    // beyond the root on the side where the function is convex: Newton's steps fall towards it and never leave the half
-    // turn
+    // beyond the root on the side where the function is convex: Newton's steps approach it monotonically and never
+    // leave the half turn
     let mut anomaly = if m >= 0.0 { (m + e).min(PI) } else { (m - e).max(-PI) };
     for _ in 0..STEPS {
         let step = (anomaly - e * anomaly.sin() - m) / (1.0 - e * anomaly.cos());

@@ -1,24 +1,24 @@
-//! The innermost loops: sums over the visible pixels that lie in a cell of the velocity grid, for several cells side by
-//! side, and their transpose.
+//! The innermost loops: sums over the visible pixels that lie in a cell of the velocity grid, for several cells in
+//! parallel, and their transpose.
 //!
-//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell, or a little beyond. What it leaves on the grid is a
-//! polynomial in t (see `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in
+//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell, or a little beyond. Its contribution to the grid is
+//! a polynomial in t (see `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in
 //! registers however many pixels there are.
 
 use super::block::{Group, LANES};
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
 use crate::numerics::vector::{self, Number, Registers, Scattered};
 
-/// Blocks (96 bytes each, and 32 of pixels) from the one at work to the one that is asked for; all of an observation
-/// follow each other.
+/// Blocks (96 bytes each, and 32 of pixels) from the current one to the prefetched one; all of an observation are
+/// contiguous.
 const AHEAD: usize = 32;
 
 /// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to
 /// 5.
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 
-/// What the pixels of each cell, times `x`, leave on its nodes: row n of `left`, as long as the grid, gets the n-th
-/// node of the cell. Where all lanes are one cell, it gets the sum of them.
+/// The contributions of the pixels of each cell, times `x`, to its nodes: row n of `left`, as long as the grid, gets
+/// the n-th node of the cell. Where all lanes are one cell, it gets the sum of them.
 ///
 /// # Safety
 /// Every pixel of every block lies within `x`, and the nodes of every cell within the grid.
@@ -31,7 +31,7 @@ pub unsafe fn gather<R: Scattered>(
     left: &mut [R::Number],
 ) {
     let grid = left.len() / DEPOSIT_NODES;
-    // lanes without a pixel may repeat a cell: they come last, and the first of two that are put in one place stays
+    // lanes without a pixel may repeat a cell: they come last, and of two stores to one place the first wins
     let (one_cell, mut totals) = (cells[0] == cells[1], [0.0; DEPOSIT_NODES]);
     for first in (0..LANES).step_by(R::LANES).rev() {
         let mut sums = [r.splat(R::Number::default()); DEPOSIT_NODES];
@@ -41,11 +41,11 @@ pub unsafe fn gather<R: Scattered>(
                 vector::fetch_ahead(block, AHEAD);
                 vector::fetch_ahead(pixels, AHEAD);
             }
-            // safe: the caller knows the pixels
+            // safe: the caller guarantees the pixels
             let x = unsafe { r.pick(x, pixels, first) };
             let (t, spread) = (r.load(&block.position, first), r.load(&block.spread, first));
             let squared = r.multiply(t, t);
-            // times 1, t, t^2 and t^3: no long chain of products, each of which waits for the one before
+            // times 1, t, t^2 and t^3: avoids a long chain of dependent products
             let term = r.multiply(x, r.load(&block.weight, first));
             let times_t = r.multiply(term, t);
             let terms = [term, times_t, r.multiply(term, squared), r.multiply(times_t, squared)];
@@ -60,7 +60,7 @@ pub unsafe fn gather<R: Scattered>(
         for ((sum, spread_sum), factor) in sums[2..].iter_mut().zip(spread_sums).zip(SPREAD_FACTORS) {
             *sum = r.multiply_add(r.splat(R::Number::of(factor)), spread_sum, *sum);
         }
-        // nodes that mirror each other have the same weights but for the sign of odd powers
+        // nodes that mirror each other have the same weights except for the sign of odd powers
         let mut nodes = sums;
         for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
             let (even, odd) = (every_second(r, weights, &sums, 0), every_second(r, weights, &sums, 1));
@@ -71,7 +71,7 @@ pub unsafe fn gather<R: Scattered>(
             if one_cell {
                 totals[n] += r.total(node);
             } else {
-                // safe: the caller knows the cells
+                // safe: the caller guarantees the cells
                 unsafe { r.put(node, &mut left[n * (grid + 1)..], cells, first) };
             }
         }
@@ -83,8 +83,8 @@ pub unsafe fn gather<R: Scattered>(
     }
 }
 
-/// Transpose of [`gather`]: adds to every pixel of `out` what it gets from the nodes of its cell. No pixel may be twice
-/// in a block but for lanes of weight 0, which come last.
+/// Transpose of [`gather`]: adds to every pixel of `out` the contribution from the nodes of its cell. No pixel may
+/// occur twice in a block except in lanes of weight 0, which come last.
 ///
 /// # Safety
 /// Every pixel of every block lies within `out`, and the nodes of every cell within `nodes`.
@@ -99,7 +99,7 @@ pub unsafe fn scatter<R: Scattered>(
     for first in (0..LANES).step_by(R::LANES) {
         let mut of_cells = [r.splat(R::Number::default()); DEPOSIT_NODES];
         for (n, node) in of_cells.iter_mut().enumerate() {
-            // safe: the caller knows the cells
+            // safe: the caller guarantees the cells
             *node = unsafe { r.pick(&nodes[n..], cells, first) };
         }
         let mut coefficients = [r.splat(R::Number::default()); DEPOSIT_NODES];
@@ -121,7 +121,7 @@ pub unsafe fn scatter<R: Scattered>(
             let squared = r.multiply(t, t);
             let [of_spread, rest] = [polynomial(r, &of_spread, t, squared), polynomial(r, &coefficients, t, squared)];
             let polynomial = r.multiply_add(of_spread, spread, rest);
-            // safe: the caller knows the pixels
+            // safe: the caller guarantees the pixels
             unsafe {
                 let sums = r.multiply_add(polynomial, r.load(&block.weight, first), r.pick(out, pixels, first));
                 r.put(sums, out, pixels, first);
@@ -138,7 +138,7 @@ fn every_second<R: Registers>(r: R, w: &[f64; DEPOSIT_NODES], s: &[R::Lanes; DEP
     r.multiply_add(r.splat(R::Number::of(w[first])), s[first], lower)
 }
 
-/// `c_0 + c_1 t + ...`, an even number of coefficients: pairs of them beside each other, then one after another.
+/// `c_0 + c_1 t + ...`, an even number of coefficients: pairs of them in parallel, then in sequence.
 #[inline(always)]
 fn polynomial<R: Registers>(r: R, coefficients: &[R::Lanes], t: R::Lanes, squared: R::Lanes) -> R::Lanes {
     let (pairs, _) = coefficients.as_chunks();

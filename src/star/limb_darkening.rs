@@ -18,7 +18,7 @@ impl LimbDarkening {
         }
     }
 
-    /// Coefficients of mu, mu^2, mu^3 and mu^4 in `mu LD(mu)`; or in `mu (1 - mu) LD(mu)`, which counts the limb alone.
+    /// Coefficients of mu, mu^2, mu^3 and mu^4 in `mu LD(mu)`; or in `mu (1 - mu) LD(mu)`, which weights the limb.
     pub(super) fn of_mu(self, limb_alone: bool) -> [f64; 4] {
         // mu (1 - u1 (1 - mu) - u2 (1 - mu)^2)
         let (u1, u2) = self.coefficients();
@@ -43,7 +43,7 @@ impl LimbDarkening {
         let limb = 1.0 - a - b;
         let turning = -a / (2.0 * b);
         let has_minimum_inside = b < 0.0 && turning > 0.0 && turning < 1.0;
-        // The rounding of 1 - a - b where they should add up to 1.
+        // Rounding of 1 - a - b where a and b sum to 1.
         limb >= -1e-12 && (!has_minimum_inside || 1.0 + a * a / (4.0 * b) > 0.0)
     }
 

@@ -1,16 +1,15 @@
-//! The local line, and its form on the velocity grid that pixels are deposited on.
+//! The local line, and its kernel on the velocity grid of the deposits.
 //!
 //! A pixel of velocity v is deposited on a uniform grid of step h with the quintic B-spline; the sum over the grid of
-//! `deposit x kernel` must give the local line `l(v - v_p)`. So the kernel is the line with the spline divided out: in
+//! `deposit x kernel` must give the local line `l(v - v_p)`. So the kernel is the line deconvolved from the spline: in
 //! Fourier space `l(k) / sinc(kh/2)^6`. For a Gaussian line `1/sinc^6 = exp(h^2 k^2/4 + h^4 k^4/480 + h^6 k^6/30240 +
 //! ...)` gives a closed form: a Gaussian narrowed by h^2/2, times two small Hermite corrections. What remains is
 //! aliasing, `2 l(k) (kh/2 pi)^6`, below 3e-7 of the line's depth for h = sigma/3.5 (the cubic spline needs h =
 //! sigma/20 for that).
 //!
-//! A Voigt profile is treated in the same way, its Gaussian narrowed and its own fourth and sixth derivatives for the
-//! Hermite corrections. Its wings are followed as far as there are bins and brightness, so that nothing of them is cut
-//! off: of the equivalent width, `(2/pi) gamma/v` lies beyond v from the centre and outside a velocity range that ends
-//! there.
+//! A Voigt profile is treated in the same way, with its Gaussian narrowed and its fourth and sixth derivatives for the
+//! Hermite corrections. Its wings extend over all bins and brightness, so that they are never cut off: of the
+//! equivalent width, `(2/pi) gamma/v` lies beyond v from the centre and outside a velocity range that ends there.
 
 use super::LocalLine;
 use super::voigt;
@@ -21,10 +20,10 @@ use std::f64::consts::TAU;
 /// Reach of a Gaussian kernel in standard deviations; the tail left out is 4e-8 of the line's area.
 const REACH_SIGMAS: f64 = 5.5;
 
-/// The line must span at least this many grid steps a standard deviation.
+/// The line must span at least this many grid steps per standard deviation.
 const STEPS_PER_SIGMA: f64 = 3.5;
 
-/// The local line with the deposit's spline divided out.
+/// The local line deconvolved from the spline of the deposit.
 #[derive(Clone, Copy, Debug)]
 pub struct LineKernel {
     sigma: f64,
@@ -58,7 +57,7 @@ impl LineKernel {
         if self.gamma > 0.0 { f64::INFINITY } else { REACH_SIGMAS * self.sigma }
     }
 
-    /// Depths on the nodes of a grid from one on that lies so many steps below the line's centre.
+    /// Depths on the nodes of a grid, from the node that lies this many steps below the line's centre.
     pub fn sample(&self, first: f64, step_kms: f64, depths: &mut [f64]) {
         vector::run(Sample { kernel: self, first, step_kms, depths });
     }
@@ -106,12 +105,12 @@ impl Task for Sample<'_> {
     }
 }
 
-/// Nodes that a pixel is deposited on, and terms of the polynomials that say with which weights.
+/// Nodes of the deposit of a pixel, and terms of the polynomials of their weights.
 pub const DEPOSIT_NODES: usize = 6;
 
 /// The quintic B-spline on one grid cell: weights of the nodes -2, -1 and 0 of the cell (rows) as polynomials in the
 /// position `t` in [-1/2, 1/2] from its middle (coefficients of 1, t, ... t^5). Those of the nodes 3, 2 and 1 are their
-/// mirror images, in which odd powers have the other sign. All six sum to the polynomial 1.
+/// mirror images, with odd powers of opposite sign. All six sum to the polynomial 1.
 ///
 /// A pixel with a spread of velocities is deposited with the means of the powers over it, `t^k + k (k - 1) t^(k-2)
 /// spread` to second order, where `spread` = (variance of its velocity) / (2 h^2).

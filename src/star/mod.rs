@@ -1,22 +1,22 @@
-//! The star and what it shows (`docs/method.md` section 1; Petit et al. 2015, section 2).
+//! The star and its observables (`docs/method.md` section 1; Petit et al. 2015, section 2).
 //!
-//! In: a map of the surface, one number a pixel, the values of star and orbit ([`StarState`]), and times. Out: line
+//! In: a map of the surface, one number per pixel, the values of star and orbit ([`StarState`]), and times. Out: line
 //! depth and continuum of every profile, by one linear [`Response`], and its transpose. Angles are radians here,
 //! velocities km/s, times days.
 //!
-//! 1. [`grid`] has the pixels, [`spots`] what a simulated map of them holds, [`brightness`] how bright that is.
+//! 1. [`grid`] has the pixels, [`spots`] the values of a simulated map, [`brightness`] their brightness.
 //! 2. For each observation: [`rotation`] turns the pixels, `view` finds the visible ones, [`limb_darkening`] darkens
 //!    them, `moments` gives each its weight and velocity. [`orbit`] shifts the whole profile; [`exposure`] has the
 //!    times of a long one.
-//! 3. `placement` puts pixels into cells of a velocity grid (`sorting`, `filling`, `block`), `deposit` adds their
-//!    brightness up there (`kernel`).
-//! 4. `convolution` makes bins of that (`correlate`) with the local line (`line_profile`, `voigt`).
-//! 5. [`response`] goes through these steps, and back, for one data set, `stacked` for several. `nearby` has a quicker
-//!    way for a star that differs little.
+//! 3. `placement` puts pixels into cells of a velocity grid (`sorting`, `filling`, `block`), `deposit` sums their
+//!    brightness there (`kernel`).
+//! 4. `convolution` converts that to bins (`correlate`) with the local line (`line_profile`, `voigt`).
+//! 5. [`response`] goes through these steps, and back, for one data set, `stacked` for several. `nearby` is faster for
+//!    a star that differs little.
 //!
-//! Beside that: [`Band`] has the flux of the star, [`observation`] has profiles and what they measure by themselves,
-//! [`injection`] puts an orbit into them, [`planet`] says what is quoted of an orbit ([`kepler`] has its anomalies),
-//! [`stability`] whether two can last.
+//! Also: [`Band`] has the flux of the star, [`observation`] profiles with their moments, [`injection`] adds an orbit to
+//! them, [`planet`] has the quoted quantities of an orbit ([`kepler`] its anomalies), [`stability`] that of two
+//! planets.
 
 mod block;
 pub mod brightness;
@@ -64,7 +64,7 @@ pub use size::Size;
 pub use spots::{Disc, Facula, Life, Spot};
 pub use stacked::Response;
 
-/// The star. [`Surface`] may have other values for some of it.
+/// The star. [`Surface`] may replace some of its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StarSettings {
     /// Period (d) that rotation cycles and `Porb/Prot` refer to.
@@ -73,11 +73,11 @@ pub struct StarSettings {
     pub epoch_d: f64,
     /// Limb-darkening law with its coefficients.
     pub limb_darkening: LimbDarkening,
-    /// Brightness of a wholly spotted pixel over that of the photosphere, in [0, 1).
+    /// Brightness of a fully spotted pixel over that of the photosphere, in [0, 1).
     pub contrast: f64,
     /// The local line, instrumental broadening included.
     pub line: LocalLine,
-    /// What differs in active regions.
+    /// Differences in active regions.
     pub regions: Regions,
 }
 
@@ -86,27 +86,27 @@ pub struct StarSettings {
 pub struct LocalLine {
     /// Standard deviation (km/s) of the Gaussian, intrinsic and instrumental widths added in quadrature.
     pub sigma_kms: f64,
-    /// The part of it that is the spectrograph's (km/s).
+    /// The instrumental part of it (km/s).
     pub instrumental_sigma_kms: f64,
     /// Half width at half depth (km/s) of the Lorentzian, 0 for none.
     pub gamma_kms: f64,
-    /// Equivalent width (km/s), wings and all; `None` as long as it is still to be measured on the profiles.
+    /// Equivalent width (km/s), wings and all; `None` until it is measured on the profiles.
     pub equivalent_width_kms: Option<f64>,
 }
 
 impl LocalLine {
-    /// A Gaussian, all of it the star's own.
+    /// A purely intrinsic Gaussian.
     pub fn gaussian(sigma_kms: f64, equivalent_width_kms: f64) -> Self {
         let equivalent_width_kms = Some(equivalent_width_kms);
         LocalLine { sigma_kms, instrumental_sigma_kms: 0.0, gamma_kms: 0.0, equivalent_width_kms }
     }
 
-    /// Standard deviation (km/s) of the star's own Gaussian.
+    /// Standard deviation (km/s) of the intrinsic Gaussian.
     pub fn own_sigma_kms(&self) -> f64 {
         (self.sigma_kms.powi(2) - self.instrumental_sigma_kms.powi(2)).max(0.0).sqrt()
     }
 
-    /// The line where another one, as it is seen elsewhere, has changed.
+    /// This line changed in the same proportions as a line for another data set.
     #[must_use]
     pub fn in_proportion(self, before: &LocalLine, after: &LocalLine) -> Self {
         let mut line = self;
@@ -123,7 +123,7 @@ impl LocalLine {
         line
     }
 
-    /// The equivalent width (km/s) of a line that profiles are made with.
+    /// The equivalent width (km/s) of a line for synthetic profiles.
     ///
     /// # Panics
     /// If it is still to be measured.
@@ -132,7 +132,7 @@ impl LocalLine {
     }
 }
 
-/// Numbers of the star's surface that stand in place of those of [`StarSettings`], where they are given.
+/// Parameters of the star's surface that replace those of [`StarSettings`], where given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
     /// First coefficient of the limb darkening.
@@ -141,19 +141,19 @@ pub struct Surface {
     pub line_sigma_kms: Option<f64>,
     /// Equivalent width (km/s) of the local line.
     pub equivalent_width_kms: Option<f64>,
-    /// Brightness of a wholly spotted pixel over that of the photosphere.
+    /// Brightness of a fully spotted pixel over that of the photosphere.
     pub contrast: Option<f64>,
-    /// What differs in active regions: width of the line, ...
+    /// Differences in active regions: width of the line, ...
     pub region_line_width: Option<f64>,
     /// ... its equivalent width, ...
     pub region_equivalent_width: Option<f64>,
     /// ... its velocity (km/s), ...
     pub region_shift_kms: Option<f64>,
-    /// ... the surface with it, ...
+    /// ... the area with it, ...
     pub region_area: Option<f64>,
-    /// ... and how much more of that there is at the limb; ...
+    /// ... the increase of that area at the limb; ...
     pub region_area_limb: Option<f64>,
-    /// ... and how much darker they are there.
+    /// ... and their additional darkening there.
     pub region_dimming_limb: Option<f64>,
 }
 
@@ -173,7 +173,7 @@ impl StarSettings {
         star
     }
 
-    /// Whether there can be such a star.
+    /// Whether such a star is possible.
     pub fn is_possible(&self) -> bool {
         (0.0..1.0).contains(&self.contrast)
             && self.line.sigma_kms > 0.0
@@ -214,6 +214,6 @@ pub struct StarState {
     pub vsys_kms: f64,
     /// Orbit of the planet, or orbits of both.
     pub motion: Motion,
-    /// What differs from the star's settings.
+    /// Parameters that replace the star's settings.
     pub surface: Surface,
 }

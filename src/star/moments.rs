@@ -1,32 +1,32 @@
-//! What one observation sees of each pixel: its weight `a mu LD(mu)`, its mean velocity, and the variance of the
+//! Moments of each pixel in one observation: its weight `a mu LD(mu)`, its mean velocity, and the variance of the
 //! velocity across it (`docs/method.md` section 1, moment matching).
 //!
-//! Pixels of a ring share their evaluation points but for the longitude, so that several of them are computed side by
-//! side, in single precision: weights, and velocities relative to the middle of the velocity grid's cell that they lie
-//! in. So are rings, as they turn.
+//! Pixels of a ring share their evaluation points except for the longitude, so that several are computed in parallel,
+//! in single precision: weights, and velocities relative to the middle of the velocity grid's cell that contains them.
+//! Rings are rotated in parallel as well.
 
 use crate::numerics::vector::Instructions;
 use crate::numerics::vector::elementary::{nearest_integer, sin_cos};
 
-/// Numbers that are computed side by side: pixels of a ring, and rings.
+/// Numbers that are computed in parallel: pixels of a ring, and rings.
 pub const CHUNK: usize = 16;
 
-/// An evaluation point of the pixels of a ring, seen from the pixels' centres as the star turns.
+/// An evaluation point of the pixels of a ring, relative to the pixels' centres as the star rotates.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// Angular velocity (rad/d).
     pub angular_velocity: f64,
     /// Longitude minus that of the pixel's centre (rad).
     pub offset: f64,
-    /// What does not turn of mu: sine of the latitude times cosine of the inclination.
+    /// The constant part of mu: sine of the latitude times cosine of the inclination.
     pub mu_pole: f64,
-    /// What turns of it.
+    /// The rotating part of it.
     pub mu_equator: f64,
     /// Velocity (steps of the velocity grid) at the limb of the equator's direction.
     pub amplitude: f64,
 }
 
-/// Rings side by side, with their pixels' evaluation points.
+/// A block of rings, with their pixels' evaluation points.
 #[derive(Clone, Debug)]
 pub struct Rings<const POINTS: usize> {
     angular_velocity: [[f64; CHUNK]; POINTS],
@@ -43,14 +43,14 @@ pub struct Rings<const POINTS: usize> {
 #[derive(Clone, Debug)]
 struct Turned<const POINTS: usize> {
     mu: [[[f32; CHUNK]; POINTS]; 2],
-    /// Mean of the points' velocities, what single precision leaves of it (an error that a ring's pixels would have in
-    /// common), and what each has more.
+    /// Mean of the points' velocities, its rounding error in single precision (which a ring's pixels would share), and
+    /// the deviation of each point.
     middle: [[f32; CHUNK]; 2],
     rest: [[f32; CHUNK]; 2],
     velocity: [[[f32; CHUNK]; POINTS]; 2],
 }
 
-/// Moments of the velocity distributions of pixels side by side, weighted by projected area and limb darkening.
+/// Moments of the velocity distributions of a block of pixels, weighted by projected area and limb darkening.
 /// Velocities are in steps of the velocity grid.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
@@ -85,8 +85,8 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
     }
 
-    /// Sets one of the rings: its points, each of which stands for so large a part of the star, and coefficients of mu
-    /// to mu^4 in their weights.
+    /// Sets one of the rings: its points, with the area fraction each represents, and coefficients of mu to mu^4 in
+    /// their weights.
     pub fn set(&mut self, ring: usize, points: [Point; POINTS], limb: [f64; 4], area: f64) {
         for (p, point) in points.into_iter().enumerate() {
             self.angular_velocity[p][ring] = point.angular_velocity;
@@ -100,13 +100,12 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
     }
 
-    /// Turns the rings to where they are `since_epoch_d` days after the star's epoch.
+    /// Rotates the rings to `since_epoch_d` days after the star's epoch.
     #[inline(always)]
     pub fn turn(&mut self, i: impl Instructions, since_epoch_d: f64) {
         let mut velocities = [[[0.0; CHUNK]; 2]; POINTS];
         for (p, velocity) in velocities.iter_mut().enumerate() {
-            // copies: what is written could be what is read, for all that the compiler knows, and it would make no
-            // vectors
+            // copies: possible aliasing would keep the compiler from vectorising
             let (angular_velocity, offset) = (self.angular_velocity[p], self.offset[p]);
             let (mu_equator, amplitude) = (self.mu_equator[p], self.amplitude[p]);
             let mut mu = [[0.0; CHUNK]; 2];
@@ -133,8 +132,8 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
     }
 
-    /// What is seen of the pixels of a ring in these directions (cosines and sines of longitudes). Where no middles of
-    /// cells are given, pixels lie within theirs.
+    /// Moments of the pixels of a ring in these directions (cosines and sines of longitudes). Without given middles of
+    /// cells, pixels lie within their own.
     #[inline(always)]
     pub fn look(
         &self,
@@ -161,7 +160,7 @@ impl<const POINTS: usize> Rings<POINTS> {
         moments
     }
 
-    /// Weights, mean velocities over that of the middle of the points, and halves of their variances.
+    /// Weights, mean velocities relative to that of the middle of the points, and halves of their variances.
     #[inline(always)]
     fn relative_moments(
         &self,
@@ -199,7 +198,7 @@ impl<const POINTS: usize> Rings<POINTS> {
     }
 }
 
-/// Velocity in a direction (cosine and sine) less `x`, rounded once: what it is near `x` it is to all digits.
+/// Velocity in a direction (cosine and sine) minus `x`, rounded once: exact to all digits near `x`.
 #[inline(always)]
 fn less(i: impl Instructions, velocity: [f32; 2], [cos, sin]: [f32; 2], x: f32) -> f32 {
     i.multiply_add_single(cos, velocity[0], i.multiply_add_single(sin, velocity[1], -x))

@@ -1,4 +1,4 @@
-//! Stars that differ little from one: their responses take the sorting of its pixels for theirs.
+//! Stars that differ little from a reference: their responses use its sorting of pixels.
 
 use super::deposit::{Arranged, Observed};
 use super::grid::SurfaceGrid;
@@ -6,22 +6,22 @@ use super::response::{DEPOSITS, Part, needs, observed};
 use super::{Response, Seen, StarSettings, StarState};
 use std::sync::Arc;
 
-/// How far (rad) a point of the surface may be from where it was: so far beyond the limb pixels have places, for 2 %
-/// more of them to be gone through in every pass.
+/// Largest displacement (rad) of a point of the surface: pixels up to this far beyond the limb are included, 2 % more
+/// in every pass.
 const MARGIN: f64 = 0.02;
 
-/// How far its velocity may be from what it was, in steps of the velocity grid, ...
+/// Largest change of its velocity, in steps of the velocity grid, ...
 const LARGEST_MOVE: f64 = 0.4;
 
-/// ... and its third power times the spread of a pixel's velocities, whose part of what a pixel leaves on the grid goes
-/// wrong so beyond the border of its cell. On the paper's setup log-probabilities are off by 1.2e-4 at most at these
-/// limits, and by less where pixels move less (`results/performance.md`).
+/// ... and largest third power of it times the spread of a pixel's velocities, to which the error of the spread term
+/// beyond the border of a cell is proportional. On the paper's setup errors of log-probabilities are 1.2e-4 at most at
+/// these limits, and by less where pixels move less (`results/performance.md`).
 const LARGEST_MOVE_OF_SPREAD: f64 = 0.01;
 
-/// Largest spread: a pixel that comes into sight point by point may move by as much.
+/// Largest spread: a pixel that appears point by point may move by as much.
 const LARGEST_SPREAD: f64 = 4.0;
 
-/// A star, and how its pixels were sorted for each data set.
+/// A star, with the sorting of its pixels for each data set.
 #[derive(Clone, Debug)]
 pub struct Nearby {
     state: StarState,
@@ -29,7 +29,7 @@ pub struct Nearby {
 }
 
 impl Nearby {
-    /// What responses close to a state of star and planet have in common.
+    /// The common part of responses close to a state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
         let arranged = |set: &Seen| {
             let star = set.star(star, &state.surface);
@@ -38,8 +38,7 @@ impl Nearby {
         Nearby { state: *state, pixels: sets.iter().map(arranged).collect() }
     }
 
-    /// The response at a state that is close by; nothing at any other. Everything but the state is to be the same as
-    /// before.
+    /// The response at a state that is close by; `None` at any other. Everything else must be the same as before.
     pub fn response(
         &self,
         grid: &SurfaceGrid,
@@ -61,7 +60,7 @@ impl Nearby {
         self.pixels.iter().zip(sets).map(part).collect::<Option<Vec<_>>>().map(Response::stacked)
     }
 
-    /// Whether all pixels are where they were, nearly.
+    /// Whether all pixels are nearly at their former positions.
     fn is_close(&self, pixels: &Arranged, star: &Observed) -> bool {
         let &Observed { grid, state, ref looks, step_kms, .. } = star;
         if step_kms != pixels.step_kms {
@@ -103,7 +102,7 @@ mod tests {
         regions: Regions::PLAIN,
     };
 
-    /// The star, and so much another one.
+    /// The star, and one that differs by this much.
     fn star(rotation: f64, shear: f64, tilt: f64, vsini_kms: f64) -> StarState {
         StarState {
             rotation: Rotation { omega_eq_rad_d: 2.1 + rotation, domega_rad_d: 0.05 + shear },
@@ -122,7 +121,7 @@ mod tests {
     #[test]
     fn stars_close_by_are_seen_as_if_they_had_been_sorted() {
         let sampling = &sampling();
-        // as many pixels as make all orders of cells; moves that are nearly as large as may be
+        // as many pixels as make all orders of cells; changes that are nearly the largest allowed
         for (pixels, quadrature, moves) in [
             (7, Quadrature::Centre, 1.0),
             (900, Quadrature::Gauss2x2, 0.45),
@@ -165,7 +164,7 @@ mod tests {
         {
             assert!(!is_close(&STAR, far), "{far:?}");
         }
-        // not a number is never close
+        // NaN is never close
         assert!(!is_close(&STAR, star(f64::NAN, 0.0, 0.0, 0.0)));
         // pixels as wide as several steps
         let coarse = &SurfaceGrid::equal_area(100, Quadrature::Gauss2x2);

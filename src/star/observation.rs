@@ -1,6 +1,6 @@
-//! Observed (or simulated) line profiles: times, velocity bins, intensities and their errors.
+//! Observed (or simulated) line profiles: times, velocity bins, intensities and their uncertainties.
 //!
-//! Also what they measure by themselves: areas and first-moment velocities.
+//! Also their areas and first-moment velocities.
 
 /// One line profile on a uniform velocity axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,11 +11,11 @@ pub struct Profile {
     pub first_velocity_kms: f64,
     /// Width of a velocity bin (km/s).
     pub step_kms: f64,
-    /// Intensity in units of the continuum, one number a bin.
+    /// Intensity in units of the continuum, one number per bin.
     pub intensity: Vec<f64>,
     /// Standard error of each intensity (positive).
     pub sigma: Vec<f64>,
-    /// Length of the exposure (s), if it is known.
+    /// Length of the exposure (s), if known.
     pub exposure_s: Option<f64>,
 }
 
@@ -36,11 +36,11 @@ pub struct Observations {
 }
 
 impl Observations {
-    /// Whether these can be the profiles of a star: two at least, in bins of one positive width, with as many errors as
-    /// intensities, all finite and the errors positive.
+    /// Whether these are valid profiles of a star: at least two, in bins of one positive width, with as many
+    /// uncertainties as intensities, all finite and the uncertainties positive.
     ///
     /// # Errors
-    /// The first thing that is wrong, in words.
+    /// The first fault, in words.
     pub fn check(&self) -> Result<(), String> {
         if self.profiles.len() < 2 {
             return Err(format!(
@@ -114,7 +114,7 @@ impl Observations {
         self.profiles.iter().map(|p| p.first_moment()).collect()
     }
 
-    /// The same in units of a continuum that is at `level` here.
+    /// The same divided by a continuum of `level`.
     pub fn over_continuum(mut self, level: f64) -> Self {
         for profile in &mut self.profiles {
             profile.intensity.iter_mut().chain(&mut profile.sigma).for_each(|x| *x /= level);
@@ -122,8 +122,8 @@ impl Observations {
         self
     }
 
-    /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the
-    /// velocity range holds whole, whatever the spots, because every pixel's line has the same one (`docs/method.md`
+    /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that is entirely
+    /// within the velocity range, whatever the spots, because every pixel's line has the same one (`docs/method.md`
     /// section 1).
     pub fn mean_equivalent_width_kms(&self) -> f64 {
         let area = |p: &Profile| p.intensity.iter().map(|i| 1.0 - i).sum::<f64>() * p.step_kms;
@@ -137,7 +137,7 @@ impl Profile {
         self.first_velocity_kms + j as f64 * self.step_kms
     }
 
-    /// Intensity (linear between bins) at a velocity (km/s) within the profile, which has two bins or more.
+    /// Intensity (linear between bins) at a velocity (km/s) within the profile, which has at least two bins.
     pub fn intensity_at(&self, velocity_kms: f64) -> f64 {
         let position = (velocity_kms - self.first_velocity_kms) / self.step_kms;
         let below = (position.floor().max(0.0) as usize).min(self.intensity.len() - 2);
@@ -147,8 +147,8 @@ impl Profile {
         self.intensity[below] + part * (self.intensity[below + 1] - self.intensity[below])
     }
 
-    /// Radial velocity `sum v (1-I) / sum (1-I)` over all bins, and its error from those of the bins,
-    /// `sqrt(sum sigma^2 (v - RV)^2) / |sum (1-I)|`. Not finite where the profile has no area.
+    /// Radial velocity `sum v (1-I) / sum (1-I)` over all bins, and its uncertainty from those of the bins, `sqrt(sum
+    /// sigma^2 (v - RV)^2) / |sum (1-I)|`. Not finite where the profile has no area.
     pub fn first_moment(&self) -> RadialVelocity {
         let depth: Vec<f64> = self.intensity.iter().map(|i| 1.0 - i).collect();
         let value_kms = self.first_moment_of(&depth);
@@ -157,7 +157,7 @@ impl Profile {
         RadialVelocity { value_kms, sigma_kms: variance.sqrt() / depth.iter().sum::<f64>().abs() }
     }
 
-    /// First moment (km/s) of other depths `1 - I`, a model's say, in the bins of this profile.
+    /// First moment (km/s) of other depths `1 - I`, such as a model's, in the bins of this profile.
     pub fn first_moment_of(&self, depth: &[f64]) -> f64 {
         let moment = |(j, depth): (usize, &f64)| self.velocity_kms(j) * depth;
         depth.iter().enumerate().map(moment).sum::<f64>() / depth.iter().sum::<f64>()

@@ -32,8 +32,8 @@ impl Orbit {
     }
 }
 
-/// Eccentricity e and argument of periastron omega of the star's orbit, as `sqrt(e) cos(omega)` and
-/// `sqrt(e) sin(omega)`. A circle is zero twice.
+/// Eccentricity e and argument of periastron omega of the star's orbit, as `sqrt(e) cos(omega)` and `sqrt(e)
+/// sin(omega)`. Both are 0 for a circular orbit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shape {
     /// `sqrt(e) cos(omega)`.
@@ -43,7 +43,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of an eccentricity and an argument of periastron (rad).
+    /// The shape of an eccentricity and an argument of periastron (rad).
     pub fn new(e: f64, omega: f64) -> Self {
         Shape { sqrt_e_cos_omega: e.sqrt() * omega.cos(), sqrt_e_sin_omega: e.sqrt() * omega.sin() }
     }
@@ -53,7 +53,7 @@ impl Shape {
         self.sqrt_e_cos_omega.powi(2) + self.sqrt_e_sin_omega.powi(2)
     }
 
-    /// Argument of periastron (rad), in (-pi, pi]; 0 for a circle.
+    /// Argument of periastron (rad), in (-pi, pi]; 0 for a circular orbit.
     pub fn omega(&self) -> f64 {
         self.sqrt_e_sin_omega.atan2(self.sqrt_e_cos_omega)
     }
@@ -70,7 +70,7 @@ impl Shape {
             false => {
                 let (e, omega) = (self.eccentricity(), self.omega());
                 let longitude = (mean_anomaly(from_node - omega, e) + omega) / TAU;
-                // in the turn of the angle itself: the two differ by less than half a turn
+                // in the cycle of the angle itself: the two differ by less than half a cycle
                 longitude - (longitude - from_node / TAU).round()
             }
         }
@@ -107,7 +107,7 @@ impl From<Orbit> for Eccentric {
     }
 }
 
-/// How planets move the star.
+/// The reflex motion by planets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// By the planet.
@@ -146,7 +146,7 @@ mod tests {
 
     const ORBIT: Orbit = Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.3 };
 
-    /// Newton's law of gravity integrated in small steps, apart from every formula here: velocity along the line of
+    /// Newton's law of gravity integrated in small steps, independent of all formulas here: velocity along the line of
     /// sight of a star whose orbit is seen edge-on, periastron at time 0.
     fn integrated(e: f64, omega: f64, times: &[f64]) -> Vec<f64> {
         // unit of length: the semi-major axis; of time: the period over 2 pi; at periastron
@@ -174,7 +174,7 @@ mod tests {
         for (e, omega) in [(0.1, 0.4), (0.5, -2.0), (0.7, 3.0)] {
             let times: Vec<f64> = (1..12).map(|k| 0.5 * f64::from(k)).collect();
             let shape = Shape::new(e, omega);
-            // periastron is so much later than the maximum
+            // delay of periastron after the maximum
             let from_maximum = -mean_anomaly(-omega, e) / TAU;
             let orbit = Orbit { k_kms: 1.0, porb_over_prot: 1.7, phi: 0.3 };
             let eccentric = Eccentric { orbit, shape };
@@ -195,7 +195,7 @@ mod tests {
             assert!((velocity(0.3) - most).abs() < 1e-12, "{e} {omega}");
             assert!((0..1000).all(|k| velocity(f64::from(k) / 1000.0) <= most + 1e-12));
             let between = eccentric.shape.longitude(0.25 * TAU) - eccentric.shape.longitude(0.0);
-            // at the conjunction the star moves across the line of sight but for e cos(omega) of the centre of mass
+            // at the conjunction the star moves across the line of sight, except for e cos(omega) of the centre of mass
             let at = 0.3 + between;
             let (middle, slope) = (velocity(at), velocity(at + 1e-5) - velocity(at - 1e-5));
             assert!((middle - ORBIT.k_kms * e * omega.cos()).abs() < 1e-12 && slope < 0.0, "{e} {omega}");

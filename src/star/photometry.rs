@@ -3,10 +3,10 @@
 
 use super::{LimbDarkening, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 
-/// What of the star looks different in a band.
+/// Properties of the star that differ in a band.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Band {
-    /// Brightness of a wholly spotted pixel over that of the photosphere; that of the star if `None`.
+    /// Brightness of a fully spotted pixel over that of the photosphere; that of the star if `None`.
     pub contrast: Option<f64>,
     /// Limb darkening; that of the star if `None`.
     pub limb_darkening: Option<LimbDarkening>,
@@ -18,15 +18,15 @@ impl Band {
         self.contrast.unwrap_or_else(|| star.with(&state.surface).contrast)
     }
 
-    /// What a spot on each pixel dims the flux of the bare photosphere by, over its own dimming, the mean of these
-    /// times (d). Where spots are as dark at the limb these are the pixels' shares in the flux, and add up to 1.
+    /// Dimming of the flux of the bare photosphere by a spot on each pixel, over the dimming of the spot, averaged over
+    /// these times (d). For spots of equal contrast at the limb these are the pixels' shares of the flux, and sum to 1.
     pub fn shares(&self, grid: &SurfaceGrid, star: &StarSettings, state: &StarState, times_d: &[f64]) -> Vec<f64> {
         let (mut star, mut state) = (star.clone(), *state);
         if let Some(limb_darkening) = self.limb_darkening {
             star.limb_darkening = limb_darkening;
             state.surface.limb_darkening = None;
         }
-        // profiles without bins: what counts is their continuum
+        // profiles without bins: only their continuum is used
         let profiles = times_d.iter().map(|time_d| (*time_d, 0.0, 0)).collect();
         let sampling = Sampling { step_kms: star.with(&state.surface).line.sigma_kms, profiles };
         let (mut shares, mut fluxes) = (vec![0.0; grid.len()], vec![0.0; times_d.len()]);
@@ -44,8 +44,8 @@ mod tests {
     use super::*;
     use crate::star::{LocalLine, Orbit, Quadrature, Regions, Rotation, Surface};
 
-    /// Shares of single pixels by the formula, on a grid so fine that a pixel is a point; and the limb darkening is
-    /// that of the band, whatever a free parameter says of the star's.
+    /// Shares of single pixels by the formula, on a grid so fine that a pixel is a point; and the band's limb darkening
+    /// overrides a free parameter of the star.
     #[test]
     fn shares_are_area_times_mu_times_limb_darkening() {
         let grid = SurfaceGrid::equal_area(20_000, Quadrature::Gauss2x2);
@@ -81,7 +81,7 @@ mod tests {
         let all: Vec<f64> = (0..grid.len()).map(wanted).collect();
         let total: f64 = all.iter().sum();
         let largest = all.iter().copied().fold(0.0, f64::max) / total;
-        // pixels at the limb are seen in part
+        // pixels at the limb are partly visible
         let worst = shares.iter().zip(&all).map(|(a, b)| (a - b / total).abs()).fold(0.0, f64::max);
         assert!(worst < 0.01 * largest, "{worst} of {largest}");
         // a mean over times

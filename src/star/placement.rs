@@ -1,23 +1,23 @@
-//! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the
-//! hot path reads them.
+//! Cell of the velocity grid, and position in it, of every visible pixel of every observation: the pairs in the order
+//! of the hot path.
 
 use super::block::{Block, Group, LANES, Pixels};
 use std::cell::Cell;
 use std::sync::Arc;
 
-/// The visible pixels of all observations, and perhaps some of weight 0 that nearly are.
+/// The visible pixels of all observations, and perhaps nearly visible ones of weight 0.
 #[derive(Clone, Debug)]
 pub struct Placement {
     arrangement: Arc<Arrangement>,
     blocks: Vec<Block>,
 }
 
-/// Which pixels stand where.
+/// Arrangement of the pixels.
 #[derive(Debug)]
 pub struct Arrangement {
     /// Number of (pixel, observation) pairs.
     pub pairs: usize,
-    /// Cells side by side, as many groups of them for each observation.
+    /// Groups of cells, equally many for each observation.
     pub groups: Vec<Cells>,
     /// Groups of an observation.
     pub groups_each: usize,
@@ -25,7 +25,7 @@ pub struct Arrangement {
     pub pixels: Vec<Pixels>,
 }
 
-/// Cells side by side, those with most pixels first; or one, whose pixels are dealt to all lanes.
+/// A group of cells, those with most pixels first; or a single cell, whose pixels are distributed over all lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells {
     /// First node of each cell.
@@ -41,12 +41,12 @@ impl Cells {
     }
 }
 
-/// The cells of a grid of velocities, which are counted in its steps.
+/// The cells of a grid of velocities, in units of its steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     /// Velocity of the first node.
     pub first_node: f64,
-    /// Cells that a pixel can lie in.
+    /// Cells that can contain a pixel.
     pub cells: usize,
 }
 
@@ -61,24 +61,24 @@ impl Scale {
 }
 
 thread_local! {
-    /// Memory that a thread had. What a large map takes, tens of megabytes, the system hands out anew page by page:
-    /// three times the time of filling it.
+    /// Memory reused by a thread. For a large map, tens of megabytes, new memory arrives page by page, which takes
+    /// three times as long as filling it.
     static SPARE_BLOCKS: Cell<Vec<Block>> = const { Cell::new(Vec::new()) };
     static SPARE_PIXELS: Cell<Vec<Pixels>> = const { Cell::new(Vec::new()) };
 }
 
-/// Memory for blocks, with whatever is in it.
+/// Memory for blocks, with arbitrary content.
 pub fn spare_blocks() -> Vec<Block> {
     SPARE_BLOCKS.take()
 }
 
-/// Memory for pixels, with whatever is in it.
+/// Memory for pixels, with arbitrary content.
 pub fn spare_pixels() -> Vec<Pixels> {
     SPARE_PIXELS.take()
 }
 
 fn give_back<T>(spare: &'static std::thread::LocalKey<Cell<Vec<T>>>, memory: &mut Vec<T>) {
-    // where a thread ends, its spare memory may be gone
+    // at the end of a thread its spare memory may be gone
     let _ = spare.try_with(|spare| {
         let (a, b) = (spare.take(), std::mem::take(memory));
         spare.set(if a.capacity() > b.capacity() { a } else { b });
@@ -98,7 +98,7 @@ impl Drop for Arrangement {
 }
 
 impl Placement {
-    /// What is seen of the pixels of an arrangement, a block each.
+    /// Moments of the pixels of an arrangement, block by block.
     pub fn new(arrangement: Arc<Arrangement>, blocks: Vec<Block>) -> Self {
         assert!(blocks.len() == arrangement.pixels.len());
         Placement { arrangement, blocks }
@@ -109,7 +109,7 @@ impl Placement {
         self.arrangement.pairs
     }
 
-    /// Which pixels stand where.
+    /// Arrangement of the pixels.
     pub fn arrangement(&self) -> &Arc<Arrangement> {
         &self.arrangement
     }

@@ -1,4 +1,4 @@
-//! What is quoted of a planet's orbit: times of the largest radial velocity and of inferior conjunction, and the
+//! Quoted quantities of a planet's orbit: times of the largest radial velocity and of inferior conjunction, and the
 //! minimum mass.
 //!
 //! The z axis points away from the observer, so that the star's radial velocity is `V = dz/dt` (positive receding) and
@@ -18,26 +18,26 @@ use std::f64::consts::TAU;
 /// From the largest radial velocity of a circular orbit to the inferior conjunction (orbital cycles).
 pub const MAXIMUM_TO_CONJUNCTION: f64 = 0.25;
 
-/// Newton steps in ln x at most; convergence is quadratic and never overshoots twice.
+/// Largest number of Newton steps in ln x; convergence is quadratic and never overshoots twice.
 const STEPS: usize = 60;
 
-/// A minimum mass and how it answers to what it was computed from.
+/// A minimum mass with its derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MinimumMass {
     /// m sin i (Jupiter masses).
     pub mjup: f64,
     /// Its derivative by the semi-amplitude (Jupiter masses s/km).
     pub by_k: f64,
-    /// Its derivative by the period (Jupiter masses a day).
+    /// Its derivative by the period (Jupiter masses per day).
     pub by_period: f64,
 }
 
-/// The minimum mass of a planet that moves a star of `mass_msun` (solar masses) with `k_kms` (of an eccentric orbit
-/// `K sqrt(1 - e^2)`) in `period_d`. An amplitude below zero is one of the opposite phase.
+/// The minimum mass of a planet that moves a star of `mass_msun` (solar masses) with `k_kms` (of an eccentric orbit `K
+/// sqrt(1 - e^2)`) in `period_d`. A negative amplitude means the opposite phase.
 pub fn minimum_mass(k_kms: f64, period_d: f64, mass_msun: f64) -> MinimumMass {
     let per_third = (period_d * SECONDS_PER_DAY / (TAU * SOLAR_GM_KM3_S2)).cbrt();
     let k = k_kms.abs();
-    // of a planet without mass of its own; exact in the limit of small K
+    // for a planet of negligible mass; exact in the limit of small K
     let light = k * per_third * mass_msun.powf(2.0 / 3.0);
     if light == 0.0 {
         let by_k = JUPITERS_PER_SUN * per_third * mass_msun.powf(2.0 / 3.0);
@@ -66,8 +66,8 @@ pub fn amplitude_kms(mjup: f64, period_d: f64, mass_msun: f64) -> f64 {
     x / (per_third * (mass_msun + x).powf(2.0 / 3.0))
 }
 
-/// Phase (orbital cycles) of the largest radial velocity of a circular orbit: phi, or opposite to it for an amplitude
-/// below zero.
+/// Phase (orbital cycles) of the largest radial velocity of a circular orbit: phi, or opposite to it for a negative
+/// amplitude.
 pub fn maximum_phase(orbit: &Orbit) -> f64 {
     if orbit.k_kms < 0.0 { orbit.phi + 0.5 } else { orbit.phi }
 }
@@ -77,8 +77,8 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// Place of star and planet (arbitrary units; z away from the observer) at an angle along a circular orbit of that
-    /// inclination.
+    /// Positions of star and planet (arbitrary units; z away from the observer) at an angle along a circular orbit of
+    /// that inclination.
     fn places(angle: f64, inclination: f64, mass_ratio: f64) -> [[f64; 3]; 2] {
         // the orbit in its own plane, then tilted about the x axis, the line of nodes
         let (x, y) = (angle.cos(), angle.sin());
@@ -109,8 +109,8 @@ mod tests {
         assert!((opposite.velocity_kms(1.7 * maximum_phase(&opposite)) - 0.1).abs() < 1e-15);
     }
 
-    /// Jupiter moves the Sun by 12.46 m/s in 11.862 years, and a planet of Jupiter's mass in a year a sun that with it
-    /// makes one solar mass by 28.43 m/s (Lovis & Fischer 2010).
+    /// Jupiter moves the Sun by 12.46 m/s in 11.862 years, and a planet of Jupiter's mass with a period of a year by
+    /// 28.43 m/s, for a total of one solar mass (Lovis & Fischer 2010).
     #[test]
     fn jupiter_has_the_mass_of_jupiter() {
         let jupiter = minimum_mass(0.012465, 4332.59, 1.0).mjup;
@@ -119,7 +119,7 @@ mod tests {
         assert!((year - 1.0).abs() < 1e-4, "{year}");
     }
 
-    /// Two bodies of any masses, each on its circle around the common centre (Kepler's third law, edge-on).
+    /// Two bodies of any masses, each on its circular orbit around the common centre (Kepler's third law, edge-on).
     #[test]
     fn the_planets_own_mass_is_counted() {
         for (star, planet) in [(1.0, 1e-6), (0.5, 0.01), (1.0, 0.3), (1.0, 2.0)] {

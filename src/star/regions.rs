@@ -1,14 +1,14 @@
-//! What differs in active regions beside their brightness: their line, how much of the surface it covers, and how
-//! contrast and cover change towards the limb (`docs/method.md` section 1).
+//! Differences in active regions other than brightness: their line, its area, and the change of contrast and area
+//! towards the limb (`docs/method.md` section 1).
 //!
-//! With the filling factor x of spots, the line l of the photosphere and that of a region, r, a profile is
-//! `sum w [l - x ((q + q1 m) l - (F + F1 m) (r - l))] / sum w [1 - x (q + q1 m)]`, `m = 1 - mu`: linear in x above and
-//! below. On the Sun lines of spots are wider and stronger, and convection is inhibited in spots and in the plages
-//! around them, which are several times as large and bright at the limb only.
+//! With the filling factor x of spots, the line l of the photosphere and that of a region, r, a profile is `sum w [l -
+//! x ((q + q1 m) l - (F + F1 m) (r - l))] / sum w [1 - x (q + q1 m)]`, `m = 1 - mu`: linear in x above and below. On
+//! the Sun lines of spots are wider and stronger, and convection is inhibited in spots and in the plages around them,
+//! which are several times as large and bright only at the limb.
 
 use super::LocalLine;
 
-/// What differs in active regions.
+/// Differences in active regions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regions {
     /// Width of the line before the spectrograph over that of the photosphere's.
@@ -17,16 +17,16 @@ pub struct Regions {
     pub equivalent_width: f64,
     /// Its velocity (km/s) over that of the photosphere, positive to the red.
     pub shift_kms: f64,
-    /// F: surface with this line per unit of the spots' filling factor.
+    /// F: area with this line per unit of the spots' filling factor.
     pub area: f64,
-    /// F1: how much more of it there is at the limb.
+    /// F1: increase of that area at the limb.
     pub area_limb: f64,
-    /// q1: how much darker spots, with all that is around them, are at the limb.
+    /// q1: additional darkening at the limb of spots with their surroundings.
     pub dimming_limb: f64,
 }
 
-/// How the photosphere's line and that of regions add up: factors of the sums over pixels as they are, and weighted by
-/// `1 - mu`, per unit of dimming.
+/// Combination of the lines of photosphere and regions: factors of the sums over pixels, plain and weighted by `1 -
+/// mu`, per unit of dimming.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mixture {
     /// Of the photosphere's line.
@@ -36,7 +36,7 @@ pub(super) struct Mixture {
 }
 
 impl Regions {
-    /// Spots that are the photosphere, dimmed.
+    /// Spots that are merely dimmed photosphere.
     pub const PLAIN: Regions = Regions {
         line_width: 1.0,
         equivalent_width: 1.0,
@@ -46,7 +46,7 @@ impl Regions {
         dimming_limb: 0.0,
     };
 
-    /// Whether spots are the photosphere, dimmed: its line counts for nothing.
+    /// Whether spots are merely dimmed photosphere: the line of regions has no effect.
     pub fn are_plain(&self) -> bool {
         self.area == 0.0 && self.area_limb == 0.0 && self.dimming_limb == 0.0
     }
@@ -68,7 +68,7 @@ impl Regions {
         }
     }
 
-    /// How lines add up where a wholly spotted pixel has this brightness.
+    /// The combination of lines for a fully spotted pixel of this brightness.
     pub(super) fn mixture(&self, contrast: f64) -> Mixture {
         let q = 1.0 - contrast;
         let (area, area_limb) = (self.area / q, self.area_limb / q);

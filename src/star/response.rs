@@ -1,5 +1,5 @@
 //! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile of one
-//! data set, before the division of one by the other; and its transpose. `stacked` puts those of several sets together.
+//! data set, before the division of one by the other; and its transpose. `stacked` combines those of several sets.
 //!
 //! `docs/method.md` section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile.
 
@@ -19,8 +19,7 @@ use std::sync::Arc;
 /// them.
 pub const MOST_NODES: f64 = 65_535.0;
 
-/// Most grid steps in a velocity bin; beyond it the line is so much narrower than a bin that it hides between two of
-/// them.
+/// Most grid steps in a velocity bin; beyond it the line is much narrower than a bin and may fall between two of them.
 pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 
 /// The response of a data set to a map of the star.
@@ -31,24 +30,26 @@ pub(super) struct Part {
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
     contrast: f64,
-    /// Of each profile the number of its map; empty where there is one.
+    /// Index of the map of each profile; empty where there is one.
     map_of: Vec<usize>,
     regions: Option<RegionPart>,
 }
 
-/// What active regions add, where they are more than the photosphere, dimmed.
+/// The terms of active regions, where they are more than dimmed photosphere.
 #[derive(Clone, Debug)]
 struct RegionPart {
-    /// Deposits weighted by `1 - mu`, too, where anything depends on that.
+    /// Deposits weighted by `1 - mu`, where needed.
     limb: Option<Arc<Deposit>>,
     convolutions: Convolutions,
     mixture: Mixture,
-    /// What the photosphere shows beyond a map of brightness 1 seen as spots are: depth of every bin, and continuum.
+    /// Difference between the bare photosphere and a map of brightness 1 computed like spots: depth of every bin, and
+    /// continuum.
     beyond: (Vec<f64>, Vec<f64>),
 }
 
 impl Part {
-    /// The response at one state of star and planet; the star has the surface of that state, as the set sees it.
+    /// The response at one state of star and planet; the star has the surface of that state, with the overrides of the
+    /// set.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
         let deposits = DEPOSITS.map(|limb_alone| {
             let observed = observed(grid, star, state, seen, limb_alone);
@@ -64,7 +65,7 @@ impl Part {
         Part::shifted([Some(Arc::clone(&self.deposit)), limb], star, state, seen)
     }
 
-    /// Where the map that profile `k` sees stands among `all` pixels; a map that is alone is seen by all.
+    /// Range of the map of profile `k` among `all` pixels; a single map is used by all.
     fn map(&self, k: usize, all: usize) -> std::ops::Range<usize> {
         let pixels = self.pixels();
         match self.map_of.get(k) {
@@ -114,7 +115,7 @@ impl Part {
         part
     }
 
-    /// What the photosphere shows beyond a map of brightness 1 seen as spots are.
+    /// Difference between the bare photosphere and a map of brightness 1 computed like spots.
     fn find_what_is_beyond(&mut self) {
         let Some(regions) = self.regions.take() else { return };
         let maps = self.map_of.iter().max().map_or(1, |last| last + 1);
@@ -132,8 +133,7 @@ impl Part {
         self.regions.as_mut().expect("set above").beyond = (line, continuum);
     }
 
-    /// Adds what the photosphere shows beyond a map of brightness 1 seen as spots are to profile `k`; to its continuum,
-    /// which is given back.
+    /// Adds that difference to profile `k` and to its continuum, which is returned.
     fn beyond(&self, k: usize, line: &mut [f64], continuum: f64) -> f64 {
         let Some(RegionPart { beyond: (of_lines, of_continua), .. }) = &self.regions else { return continuum };
         line.iter_mut().zip(&of_lines[self.bins(k)]).for_each(|(line, beyond)| *line += beyond);
@@ -146,7 +146,7 @@ impl Part {
         [self.convolutions.rows(bins), of_regions.rows(bins)]
     }
 
-    /// Brightness of a spot over that of the photosphere in the state that it was made at.
+    /// Brightness of a spot over that of the photosphere at the state of this response.
     pub fn contrast(&self) -> f64 {
         self.contrast
     }
@@ -190,7 +190,7 @@ impl Part {
         }
     }
 
-    /// How they change with the brightness, by `x`.
+    /// Their change for a change `x` of the brightness.
     pub fn change(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         vector::run(Apply { response: self, x, line, continuum });
@@ -202,30 +202,29 @@ impl Part {
         vector::run(ApplyTranspose { response: self, line, continuum, out });
     }
 
-    /// The transpose of what `weigh` makes of the line depth and continuum of every profile for the map `x`: given the
-    /// number of a profile, the depth of its bins, and its continuum, it replaces the depths, and returns what replaces
-    /// the continuum. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads
-    /// comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
+    /// The transpose applied to the result of `weigh` on the line depth and continuum of every profile for the map `x`:
+    /// given the number of a profile, the depth of its bins, and its continuum, it replaces the depths, and returns the
+    /// replacement of the continuum. `out` is overwritten. Both passes run profile by profile, so that data of a large
+    /// map are read from memory once. Maps in single precision are accurate to six digits, and faster.
     pub fn apply_and_back<N: Number>(&self, x: &[N], out: &mut [N], weigh: impl FnMut(usize, &mut [f64], f64) -> f64) {
         vector::run(ApplyAndBack { response: self, x, out, weigh });
     }
 
-    /// Normalised depth `1 - I` of every bin of a star that changes: profile k sees the brightness map in column k
+    /// Normalised depth `1 - I` of every bin for an evolving star: profile k sees the brightness map in column k
     /// (pixels, profiles).
     pub fn depths_of_each(&self, brightness: DMatrixView<f64>, depths: &mut [f64]) {
         vector::run(OfEach { response: self, brightness, depths });
     }
 }
 
-/// Size of the velocity grid that a response takes: grid steps a bin, and nodes; the star has the surface of the state,
-/// as the set sees it. Refuse more than
-/// [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is asked for.
+/// Size of the velocity grid for a response: grid steps per bin, and nodes; the star has the surface of the state, with
+/// the overrides of the set. Refuse more than [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is made.
 pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
     let steps = LineKernel::steps_per_bin(narrowest(star), step_kms) as f64;
     (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
 }
 
-/// The deposits that a response may need: of pixels as they are, and weighted by `1 - mu`.
+/// The deposits that a response may need: plain, and weighted by `1 - mu`.
 pub(super) const DEPOSITS: [bool; 2] = [false, true];
 
 /// Whether a star needs one of them.
@@ -233,7 +232,7 @@ pub(super) fn needs(star: &StarSettings, limb_alone: bool) -> bool {
     !limb_alone || star.regions.know_the_limb()
 }
 
-/// A star, its surface that of the state, as it is observed.
+/// A star with the surface of the state, and its observations.
 pub(super) fn observed<'a>(
     grid: &'a SurfaceGrid,
     star: &StarSettings,
@@ -249,14 +248,14 @@ pub(super) fn observed<'a>(
     Observed { grid, state, limb: star.limb_darkening, limb_alone, looks, step_kms }
 }
 
-/// One profile after another, in one direction: the rows of the grid are left as that direction left them.
+/// One profile after another, in one direction: the rows of the grid keep the state of that direction.
 struct Pass<'a, N> {
     response: &'a Part,
     /// Of the photosphere's line, and of that of regions.
     nodes: [Vec<f64>; 2],
-    /// Of pixels as they are, and weighted by `1 - mu`.
+    /// Plain, and weighted by `1 - mu`.
     deposited: [Vec<f64>; 2],
-    /// What cells leave on their nodes, or what they are given there.
+    /// Contributions of cells to their nodes, or from them.
     of_cells: Vec<N>,
     rows: [Rows; 2],
 }
@@ -268,7 +267,8 @@ impl<'a, N: Number> Pass<'a, N> {
         Pass { response, nodes, deposited, of_cells: Vec::new(), rows: response.rows() }
     }
 
-    /// Line depth of every bin of profile `k` (overwritten) for the map `x`, seen as spots are; returns its continuum.
+    /// Line depth of every bin of profile `k` (overwritten) for the map `x`, computed like spots; returns its
+    /// continuum.
     #[inline(always)]
     fn forward<I: Instructions>(&mut self, i: I, k: usize, x: &[N], line: &mut [f64]) -> f64 {
         let Pass { response, nodes: [nodes, of_regions], deposited, of_cells, rows } = self;
@@ -414,7 +414,7 @@ impl<N: Number, F: FnMut(usize, &mut [f64], f64) -> f64> Task for ApplyAndBack<'
     }
 }
 
-/// The sum of all, in parts that do not wait for each other.
+/// The sum of all, in independent parts.
 #[inline(always)]
 fn total(x: &[f64]) -> f64 {
     let (chunks, rest) = x.as_chunks::<16>();
@@ -460,7 +460,7 @@ mod tests {
         };
         let sampling = Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (0.7 * k as f64, -50.0, 57)).collect() };
         let grid = SurfaceGrid::equal_area(700, Quadrature::Gauss2x2);
-        // built and shifted by this processor's instructions: both see the same pairs
+        // built and shifted with this processor's instructions: both have the same pairs
         let response = &Part::new(&grid, &star, &state, &sampling.into());
         let (x, y, z) = (noise(grid.len()), noise(response.data_len()), noise(response.profiles()));
         let profiles = || (vec![f64::NAN; y.len()], vec![f64::NAN; z.len()], vec![f64::NAN; x.len()]);
@@ -474,7 +474,7 @@ mod tests {
         assert_close(&continuum, &plain_continuum);
         assert_close(&map, &plain_map);
 
-        // there and back, as one and one after the other, in double and in single precision
+        // forward and back, combined and in sequence, in double and in single precision
         let (mut out, mut single, factor) = (vec![f64::NAN; x.len()], vec![f32::NAN; x.len()], 0.3);
         let weigh = |k: usize, line: &mut [f64], continuum: f64| {
             line.iter_mut().zip(&y[response.bins(k)]).for_each(|(line, y)| *line *= y);

@@ -1,15 +1,15 @@
-//! What data sets see of the star: when and at which velocities, and what looks different through each.
+//! Data sets as seen by the star model: times and velocities, and overrides of the star for each.
 
 use super::exposure::{Exposure, Smearing};
 use super::{LimbDarkening, LocalLine, Regions, StarSettings, StarState, Surface};
 use crate::star::observation::Observations;
 
-/// When and at which velocities a data set observes the star.
+/// Times and velocities of a data set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampling {
     /// Width of a velocity bin (km/s).
     pub step_kms: f64,
-    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
+    /// For each profile: time (d), velocity of its first bin (km/s), number of bins.
     pub profiles: Vec<(f64, f64, usize)>,
 }
 
@@ -26,35 +26,35 @@ impl Sampling {
     }
 }
 
-/// What a data set sees: when and at which velocities, and what of the star looks different through it.
+/// A data set: times and velocities, and its overrides of the star.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seen {
     /// Local line, instrumental broadening included; that of the star's settings if `None`.
     pub line: Option<LocalLine>,
-    /// Brightness of a wholly spotted pixel over that of the photosphere; that of the star's settings if `None`.
+    /// Brightness of a fully spotted pixel over that of the photosphere; that of the star's settings if `None`.
     pub contrast: Option<f64>,
     /// Limb darkening; that of the star's settings if `None`.
     pub limb_darkening: Option<LimbDarkening>,
-    /// What differs in active regions; as the star's settings have it if `None`.
+    /// Differences in active regions; those of the star's settings if `None`.
     pub regions: Option<Regions>,
     /// Times and velocity bins.
     pub sampling: Sampling,
-    /// The map that each profile sees, where the star has several; empty where it has one.
+    /// The map of each profile, where the star has several; empty where it has one.
     pub own_maps: Vec<OwnMap>,
     /// The exposure of each profile; empty where all are instants.
     pub exposures: Vec<Exposure>,
 }
 
-/// One of several maps of a star, as one profile sees it.
+/// One of several maps of a star, for one profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnMap {
     /// Its number, from 0.
     pub number: usize,
-    /// The time (d) from which rotation turns it, in place of the star's.
+    /// The time (d) of its origin of longitudes, in place of the star's epoch.
     pub epoch_d: f64,
 }
 
-/// The narrower one of the star's lines.
+/// The narrower of the star's lines.
 pub(super) fn narrowest(star: &StarSettings) -> LocalLine {
     let of_regions = star.regions.line(star.line);
     match star.regions.are_plain() || star.line.sigma_kms <= of_regions.sigma_kms {
@@ -78,8 +78,8 @@ impl From<Sampling> for Seen {
 }
 
 impl Seen {
-    /// Exposures of these lengths (d), 0 for one that is not known, as this set sees the star at a state; empty where
-    /// all are instants. How often the star is looked at in them does not change with the state any more.
+    /// Exposures of these lengths (d), 0 if unknown, for this set at a state; empty where all are instants. The number
+    /// of samples in them no longer changes with the state.
     pub fn exposures(&self, star: &StarSettings, state: &StarState, lengths_d: &[f64]) -> Vec<Exposure> {
         let smearing = Smearing {
             vsini_kms: state.vsini_kms,
@@ -91,8 +91,8 @@ impl Seen {
         if exposures.iter().all(|exposure| exposure.looks == 1) { Vec::new() } else { exposures }
     }
 
-    /// The star with such a surface as this set sees it. Where its line is another one than the star's, it changes in
-    /// proportion to that.
+    /// The star with such a surface and the overrides of this set. A line of the set changes in proportion to that of
+    /// the star.
     pub fn star(&self, star: &StarSettings, surface: &Surface) -> StarSettings {
         let mut seen = star.with(surface);
         if let Some(own) = self.line {
@@ -125,7 +125,7 @@ mod tests {
         let sampling = Sampling { step_kms: 2.0, profiles: Vec::new() };
         let limb_darkening = Some(LimbDarkening::Linear(0.4));
         let set = Seen { line: Some(own), limb_darkening, regions: Some(regions), ..sampling.clone().into() };
-        // the fit finds the line half as wide as it was, and a third stronger
+        // the fit finds the line half as wide, and a third stronger
         let surface = Surface {
             line_sigma_kms: Some(2.0),
             equivalent_width_kms: Some(8.0),

@@ -1,5 +1,4 @@
-//! What rotation period, vsini and inclination together say of a star: its radius, and what it takes to hold it
-//! together.
+//! Implications of rotation period, vsini and inclination: the radius of a star, and the mass for its stability.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +6,7 @@ use std::f64::consts::TAU;
 const SUN_KM: f64 = 695_700.0;
 const SUN_BOUND: f64 = 1.327_124_4e11 / SUN_KM;
 
-/// A star that turns.
+/// A rotating star.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     /// R sin i (solar radii).
@@ -16,17 +15,17 @@ pub struct Size {
     pub equator_kms: f64,
     /// Velocity at which a star of one solar mass and this radius breaks up (km/s).
     pub break_up_kms: f64,
-    /// Least mass that holds it together at this velocity (solar masses): v^2 R / G, tides and flattening apart.
+    /// Smallest mass that is stable at this velocity (solar masses): v^2 R / G, ignoring flattening.
     pub least_mass: f64,
 }
 
-/// No star is larger (solar radii), turns faster (km/s) or is heavier (solar masses).
+/// Upper bounds of radius (solar radii), equatorial velocity (km/s) and mass (solar masses) of stars.
 const LARGEST: f64 = 1500.0;
 const FASTEST_KMS: f64 = 700.0;
 const HEAVIEST: f64 = 200.0;
 
 impl Size {
-    /// Of a star that turns once in so many days, with vsini (km/s) and inclination (deg).
+    /// From rotation period (d), vsini (km/s) and inclination (deg).
     pub fn of(rotation_period_d: f64, vsini_kms: f64, inclination_deg: f64) -> Self {
         let radius_sin_i = vsini_kms * rotation_period_d * 86_400.0 / TAU / SUN_KM;
         let sin_i = inclination_deg.to_radians().sin();
@@ -40,7 +39,7 @@ impl Size {
         }
     }
 
-    /// Why there is no such star: the key at fault, and what is wrong. `None` where there may be one.
+    /// Why such a star is impossible: the key at fault, and the error. `None` where it is possible.
     pub fn refused(&self) -> Option<(&'static str, String)> {
         let Size { radius_sin_i, equator_kms, least_mass, .. } = *self;
         if equator_kms > FASTEST_KMS {

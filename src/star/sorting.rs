@@ -1,7 +1,7 @@
 //! Sorts the visible pixels of every observation into the cells of the velocity grid.
 //!
-//! Cells stand side by side (`block`) as [`Order`] says: the fewer pixels a cell has, the more it matters that those of
-//! a group have as many; the larger the map, the more that neighbours are taken one after another.
+//! Cells are grouped (`block`) by [`Order`]: for few pixels per cell it is important that cells of a group have equally
+//! many; for large maps that neighbours are contiguous.
 
 use super::block::{Block, LANES, Pixels};
 use super::filling::{Seats, Source, fill};
@@ -12,25 +12,25 @@ use crate::numerics::vector::elementary::SINGLE_INTEGERS;
 use crate::numerics::vector::{Instructions, Task};
 use std::sync::Arc;
 
-/// The work that makes a [`Placement`]: looks at the pixels of every observation and sorts the visible ones into cells.
+/// The work that makes a [`Placement`]: finds the visible pixels of every observation and sorts them into cells.
 pub struct Sort<'a> {
     /// The pixels.
     pub grid: &'a SurfaceGrid,
-    /// Who looks at them.
+    /// The view of the observer.
     pub viewer: Viewer,
-    /// Which of them are looked at.
+    /// The rings in use.
     pub sight: Sight,
     /// The velocity grid.
     pub scale: Scale,
-    /// How cells stand.
+    /// The order of cells.
     pub order: Order,
     /// Times of the observations since the star's epoch (d).
     pub since_epoch_d: &'a [f64],
-    /// Whether the placement is to be filled again.
+    /// Whether the placement will be filled again.
     pub again: bool,
 }
 
-/// How cells stand side by side.
+/// The order of cells in groups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     /// In the order of their numbers of pixels.
@@ -87,7 +87,7 @@ impl Sort<'_> {
             sorter.sort(&parts, &mut arrangement);
             blocks.resize(arrangement.pixels.len(), Block::default());
             let seats = &sorter.seats.as_chunks().0[..blocks.len() - first_block];
-            // safe: whoever was sorted was seen, or is one of those of weight 0 behind the last
+            // safe: every sorted pixel was visible, or is one of those of weight 0 after the last
             #[allow(unsafe_code)]
             unsafe {
                 fill(instructions, seats, &seen, &mut blocks[first_block..]);
@@ -100,7 +100,7 @@ impl Sort<'_> {
     }
 }
 
-/// What one observation sees, sorted.
+/// The sorted pixels of one observation.
 struct Sorter {
     scale: Scale,
     order_of_cells: Order,
@@ -108,26 +108,26 @@ struct Sorter {
     map_pixels: usize,
     /// Number of visible pixels.
     pixels: usize,
-    /// Index of each in the map, in the order in which they were seen, and behind the last those of [`NOTHING`] others.
+    /// Index of each in the map, in the order of the view, and after the last those of [`NOTHING`] others.
     index: Vec<u32>,
     /// Its cell.
     cell: Vec<u32>,
-    /// How many of the pixels before it lie in its cell, times the places from one to the next.
+    /// Number of earlier pixels in its cell, times the stride between their places.
     rank: Vec<u32>,
     /// Pixels in each cell.
     counts: Vec<u32>,
-    /// The cells as they stand side by side.
+    /// The cells in the order of groups.
     order: Vec<u32>,
     /// Place of the first pixel of each cell among the sorted ones.
     firsts: Vec<u32>,
-    /// The pixels of all cells of all groups one after another, as many places for each cell of a group.
+    /// The pixels of all cells of all groups in sequence, with equally many places for each cell of a group.
     seats: Vec<u32>,
 }
 
 impl Sorter {
     fn new(scale: Scale, order: Order, pixels: usize) -> Self {
         let (room, cells) = ((pixels + NOTHING).next_multiple_of(LANES), scale.cells);
-        // what unchecked places rely on: none of them is beyond 32 bits
+        // precondition of unchecked places: none of them is beyond 32 bits
         assert!(LANES.saturating_mul(pixels + cells + LANES) < u32::MAX as usize);
         Sorter {
             scale,
@@ -151,12 +151,12 @@ impl Sorter {
         let (whole, last) = (self.pixels.next_multiple_of(LANES), self.scale.cells as u32 - 1);
         let first = self.scale.first_middle();
         for (cell, middle) in self.cell[..whole].iter_mut().zip(&seen.middle) {
-            // from 2^23 on integers stand in the last bits; at angles beyond all meaning velocities are, too
+            // from 2^23 on integers are in the last bits; at meaninglessly large angles velocities are as large
             *cell = (middle - first + SINGLE_INTEGERS).to_bits().wrapping_sub(SINGLE_INTEGERS.to_bits()).min(last);
         }
     }
 
-    /// Adds what was placed to the arrangement.
+    /// Adds the placed pixels to the arrangement.
     #[inline(always)]
     fn sort(&mut self, parts: &[Part], arrangement: &mut Arrangement) {
         arrangement.pairs += self.pixels;
@@ -167,7 +167,7 @@ impl Sorter {
             let most = self.counts[cells[0] as usize];
             let rows = if self.order_of_cells == Order::OneByOne { most.div_ceil(LANES as u32) } else { most };
             let end = first_block + rows;
-            // lanes that are left over at the end repeat a cell and have no pixel
+            // unused lanes at the end repeat a cell and have no pixel
             let first_nodes = std::array::from_fn(|lane| *cells.get(lane).unwrap_or(&cells[0]));
             arrangement.groups.push(Cells { first_nodes, blocks: [first_block, end] });
             first_block = end;
@@ -207,7 +207,7 @@ impl Sorter {
             return;
         }
         let most = counts.iter().fold(0, |most, count| most.max(*count)) as usize;
-        // of each number of pixels the cells that have it, then those that have more
+        // for each number of pixels the cells that have it, then those with more
         let mut places = vec![0; most + 1];
         counts.iter().for_each(|count| places[*count as usize] += 1);
         let mut more = 0;
@@ -221,18 +221,18 @@ impl Sorter {
         }
     }
 
-    /// Sorts the pixels by group, cell, and order in which they were seen.
+    /// Sorts the pixels by group, cell, and order of the view.
     #[inline(always)]
     #[allow(unsafe_code)]
     fn sort_pixels(&mut self, groups: &[Cells]) {
-        // from one pixel of a cell to the next, and as many cells
+        // stride from one pixel of a cell to the next, and number of cells
         let step = self.order_of_cells.side_by_side();
         let mut end = 0;
         for (group, cells) in groups.iter().zip(self.order.chunks(step)) {
             let places = end..end + LANES * group.rows();
             self.seats.resize(self.seats.len().max(places.end), 0);
-            // where cells have no pixels left: hardly ever one of the map in two blocks that follow each other, for no
-            // sum to wait for another
+            // for cells without further pixels: rarely the same pixel of the map in two successive blocks, so that sums
+            // are independent
             let full = cells.get(step - 1).map_or(0, |last| step * self.counts[*last as usize] as usize);
             for (k, place) in self.seats[places.clone()][full..].iter_mut().enumerate() {
                 *place = (self.pixels + k % NOTHING) as u32;
@@ -243,8 +243,8 @@ impl Sorter {
             end = places.end;
         }
         for (k, (cell, rank)) in self.cell[..self.pixels].iter().zip(&self.rank).enumerate() {
-            // safe: a cell is at most the last, and `firsts` has an entry for each; a rank is below what was counted of
-            // its cell, for which there is room in `seats`
+            // safe: a cell is at most the last, and `firsts` has an entry for each; a rank is below the count of its
+            // cell, for which `seats` has room
             unsafe {
                 let place = self.firsts.get_unchecked(*cell as usize) + rank;
                 *self.seats.get_unchecked_mut(place as usize) = k as u32;
@@ -262,7 +262,7 @@ mod tests {
     use crate::star::line_profile::DEPOSIT_NODES;
     use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
 
-    /// Deposits `x` as an observation sees it on so many nodes, and gives a map what it gets from others.
+    /// Deposits `x` for an observation on this many nodes, and applies the transpose to others.
     struct Both<'a>(&'a Placement, usize, &'a [f64], usize);
 
     impl Task for Both<'_> {
@@ -275,7 +275,7 @@ mod tests {
             let (mut left, mut out) = (vec![0.0; DEPOSIT_NODES * nodes], vec![0.0; x.len()]);
             let given: Vec<f64> = (0..nodes).map(|node| (1.3 * node as f64).cos()).collect();
             for group in placement.groups_of(observation) {
-                // safe: `x` has the map's pixels, and the grid so many nodes
+                // safe: `x` has the map's pixels, and the grid this many nodes
                 unsafe {
                     kernel::gather(i.doubles(), group, x, &mut left);
                     kernel::scatter(i.doubles(), group, &given, &mut out);

@@ -1,8 +1,8 @@
 //! Hard-edged circular spots and faculae: the filling factor and the excess of brightness of a point of the surface.
 //!
-//! Spots may come and go: the area of one grows linearly to its largest and falls again, over twice its lifetime.
-//! Places are those of the map, whose longitudes are counted at the epoch; differential rotation carries them on. A
-//! spot that comes and goes is round at the time of its largest area, so that on the map it is wound the other way.
+//! Spots may evolve: the area of one grows linearly to its maximum and decays again, over twice its lifetime. Positions
+//! are those of the map, whose longitudes refer to the epoch; differential rotation moves them. An evolving spot is
+//! circular at the time of its largest area, so that on the map it is sheared the opposite way.
 
 use std::f64::consts::PI;
 
@@ -25,9 +25,9 @@ impl Disc {
         cos_distance >= self.radius.cos()
     }
 
-    /// Whether something at (longitude, latitude) that extends to `reach` from there (all rad) may overlap it.
+    /// Whether a feature at (longitude, latitude) that extends to `reach` from there (all rad) may overlap it.
     pub fn may_touch(&self, longitude: f64, latitude: f64, reach: f64) -> bool {
-        // more than what rounding makes of an arc cosine
+        // larger than the rounding error of an arc cosine
         const MARGIN: f64 = 1e-6;
         let radius = (self.radius + reach + MARGIN).min(PI);
         Disc { radius, ..*self }.contains(longitude, latitude)
@@ -45,18 +45,18 @@ pub struct Spot {
     pub radius: f64,
     /// Spot filling factor inside it, in [0, 1].
     pub filling: f64,
-    /// When it is there; `None` for ever.
+    /// Its evolution in time; `None` if static.
     pub life: Option<Life>,
 }
 
-/// When a spot is there.
+/// The evolution of a spot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Life {
     /// Time of its largest area (d).
     pub peak_d: f64,
     /// Full width at half maximum of its area in time (d).
     pub lifetime_d: f64,
-    /// By how much the equator has turned against the pole from the epoch to then (rad).
+    /// Rotation of the equator relative to the pole from the epoch to that time (rad).
     pub winding: f64,
 }
 
@@ -68,12 +68,12 @@ impl Life {
 }
 
 impl Spot {
-    /// The circle that it fills, at its largest and where it is round.
+    /// Its circle at the largest area, when it is circular.
     pub fn disc(&self) -> Disc {
         Disc { longitude: self.longitude, latitude: self.latitude, radius: self.radius }
     }
 
-    /// Its radius (rad) at a time (d), 0 while it is not there. The area of a cap of radius r is 4 pi sin^2(r / 2).
+    /// Its radius (rad) at a time (d), 0 while it is absent. The area of a cap of radius r is 4 pi sin^2(r / 2).
     pub fn radius_at(&self, time_d: f64) -> f64 {
         match self.life {
             Some(life) => 2.0 * (life.area(time_d).sqrt() * (0.5 * self.radius).sin()).asin(),
@@ -86,14 +86,14 @@ impl Spot {
         self.disc().contains(longitude + self.unwinding(latitude), latitude)
     }
 
-    /// Whether something at (longitude, latitude) that extends to `reach` from there (all rad) may overlap it.
+    /// Whether a feature at (longitude, latitude) that extends to `reach` from there (all rad) may overlap it.
     pub fn may_touch(&self, longitude: f64, latitude: f64, reach: f64) -> bool {
         let winding = self.life.map_or(0.0, |life| life.winding.abs());
-        // no latitude turns against another by more than the winding times their distance
+        // the relative rotation of two latitudes is at most the winding times their distance
         self.disc().may_touch(longitude + self.unwinding(latitude), latitude, reach * (1.0 + winding))
     }
 
-    /// What is added to longitudes at a latitude where the spot is to be round.
+    /// Offset of longitudes at a latitude in the frame where the spot is circular.
     fn unwinding(&self, latitude: f64) -> f64 {
         match self.life {
             Some(Life { winding, .. }) if winding != 0.0 => {
@@ -103,10 +103,10 @@ impl Spot {
         }
     }
 
-    /// Its numbers as a config has them: longitude, latitude and radius (degrees), filling factor, and where it comes
-    /// and goes the time of its largest area and its lifetime (d).
+    /// Its values in a config: longitude, latitude and radius (degrees), filling factor, and if it evolves the time of
+    /// its largest area and its lifetime (d).
     pub fn written(&self) -> Vec<f64> {
-        // degrees of radians of degrees are not what they were in the last digit
+        // conversion to radians and back changes the last digit
         let degrees = |x: f64| (1e9 * x.to_degrees()).round() / 1e9;
         let Spot { longitude, latitude, radius, filling, life } = *self;
         let mut numbers = vec![degrees(longitude), degrees(latitude), degrees(radius), filling];
@@ -115,7 +115,7 @@ impl Spot {
     }
 }
 
-/// The spots that are there at a time (d), as large as they are then.
+/// The spots present at a time (d), with their sizes then.
 pub fn spots_at(spots: &[Spot], time_d: f64) -> Vec<Spot> {
     let at = spots.iter().map(|spot| Spot { radius: spot.radius_at(time_d), ..*spot });
     at.filter(|spot| spot.radius > 0.0).collect()
@@ -124,7 +124,7 @@ pub fn spots_at(spots: &[Spot], time_d: f64) -> Vec<Spot> {
 /// A circular facula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facula {
-    /// Where it is.
+    /// Its circle.
     pub disc: Disc,
     /// Brightness inside it minus that of the photosphere, which is 1; above 0.
     pub excess: f64,

@@ -1,7 +1,7 @@
-//! Whether two planets can last beside each other.
+//! Stability of two planets.
 //!
 //! Orbits must not cross: `a1 (1 + e1) < a2 (1 - e2)`. Where the star's mass is known the planets must be stable by
-//! Hill's criterion as well, so that close encounters are impossible for ever (Gladman 1993, *Icarus* 106, 247,
+//! Hill's criterion as well, so that close encounters are impossible at all times (Gladman 1993, *Icarus* 106, 247,
 //! equation 21): with `mu_i = m_i / M`, `alpha = mu_1 + mu_2`, `gamma_i = sqrt(1 - e_i^2)` and `delta = sqrt(a2 / a1)`,
 //!
 //! `alpha^-3 (mu_1 + mu_2 / delta^2) (mu_1 gamma_1 + mu_2 gamma_2 delta)^2 > 1 + 3^(4/3) mu_1 mu_2 / alpha^(4/3)`.
@@ -12,7 +12,7 @@ use super::Eccentric;
 use super::planet::minimum_mass;
 use crate::numerics::units::JUPITERS_PER_SUN;
 
-/// Why two planets cannot last beside each other.
+/// Why two planets are unstable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unstable {
     /// Their orbits cross.
@@ -23,8 +23,8 @@ pub enum Unstable {
     Hill,
 }
 
-/// Whether planets that move the star so can last; of a star with that rotation period (d), and mass (solar masses) if
-/// it is known.
+/// Whether planets with these orbits are stable, for a star with that rotation period (d), and mass (solar masses) if
+/// known.
 ///
 /// # Errors
 /// [`Unstable`].
@@ -70,8 +70,8 @@ mod tests {
         Eccentric { orbit: Orbit { k_kms, porb_over_prot, phi: 0.0 }, shape: Shape::new(e, 1.0) }
     }
 
-    /// Small planets on circles are stable where they are farther apart than 2 sqrt(3) mutual Hill radii, `a1 ((mu1 +
-    /// mu2) / 3)^(1/3)` (Gladman 1993, equation 24).
+    /// Small planets on circular orbits are stable if farther apart than 2 sqrt(3) mutual Hill radii, `a1 ((mu1 + mu2)
+    /// / 3)^(1/3)` (Gladman 1993, equation 24).
     #[test]
     fn circles_are_stable_beyond_two_root_three_hill_radii() {
         let (mass_msun, rotation_period_d) = (1.0, 3.0);

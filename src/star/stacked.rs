@@ -1,5 +1,5 @@
-//! The response of several data sets, one after the other: each has its own local line, spot contrast and velocity
-//! axis, and all see one star. A single set is the usual case.
+//! The response of several data sets in sequence: each has its own local line, spot contrast and velocity axis, and all
+//! share one star. A single set is the usual case.
 
 use super::grid::SurfaceGrid;
 use super::response::Part;
@@ -15,7 +15,7 @@ pub struct Response {
     parts: Vec<Part>,
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
-    /// Of each profile, which set it is of.
+    /// Index of the data set of each profile.
     set_of: Vec<usize>,
 }
 
@@ -31,7 +31,7 @@ impl Response {
         Response::stacked(sets.iter().map(part).collect())
     }
 
-    /// Of its parts, one a data set.
+    /// From its parts, one per data set.
     pub(super) fn stacked(parts: Vec<Part>) -> Self {
         let (mut starts, mut set_of) = (vec![0], Vec::new());
         for (s, part) in parts.iter().enumerate() {
@@ -49,7 +49,7 @@ impl Response {
         Response::stacked(self.parts.iter().zip(sets).map(shifted).collect())
     }
 
-    /// Brightness of a spot over that of the photosphere, as profile `k` sees it, in the state that this was made at.
+    /// Brightness of a spot over that of the photosphere, for profile `k`, at the state of this response.
     pub fn contrast(&self, k: usize) -> f64 {
         self.parts[self.set_of[k]].contrast()
     }
@@ -94,8 +94,8 @@ impl Response {
         })
     }
 
-    /// Line depth of every bin and continuum of every profile for the brightness map `x`; or for the maps in `x`, one
-    /// after the other, of which each profile sees its own.
+    /// Line depth of every bin and continuum of every profile for the brightness map `x`; or for several maps in `x` in
+    /// sequence, each profile using its own.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         for (part, profiles, bins) in self.places() {
@@ -103,7 +103,7 @@ impl Response {
         }
     }
 
-    /// How they change with the brightness, by `x`.
+    /// Their change for a change `x` of the brightness.
     pub fn change(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         for (part, profiles, bins) in self.places() {
@@ -111,8 +111,8 @@ impl Response {
         }
     }
 
-    /// What [`Response::apply`] gives of maps that are another one in each data set, as the brightness of spots is:
-    /// `fill` is given the first profile of the set, and makes its `map`.
+    /// [`Response::apply`] for maps that differ between data sets, like the brightness of spots: `fill` receives the
+    /// first profile of the set, and makes its `map`.
     pub fn apply_each(
         &self,
         map: &mut [f64],
@@ -132,10 +132,10 @@ impl Response {
         self.summed(out, |part, profiles, bins, out| part.apply_transpose(&line[bins], &continuum[profiles], out));
     }
 
-    /// The transpose of what `weigh` makes of the changes of line depth and continuum of every profile by `x`: given
-    /// the number of a profile, those of its bins, and of its continuum, it replaces the former, and returns what
-    /// replaces the latter. `out` is overwritten. It goes there and back profile by profile: what a large map's pass
-    /// reads comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
+    /// The transpose applied to the result of `weigh` on the changes of line depth and continuum of every profile by
+    /// `x`: given the number of a profile, those of its bins, and of its continuum, it replaces the former, and returns
+    /// the replacement of the latter. `out` is overwritten. Both passes run profile by profile, so that data of a large
+    /// map are read from memory once. Maps in single precision are accurate to six digits, and faster.
     pub fn apply_and_back<N: Number>(
         &self,
         x: &[N],
@@ -147,7 +147,7 @@ impl Response {
         });
     }
 
-    /// The sum over the parts of what each makes of a map.
+    /// The sum over the parts of their contributions to a map.
     fn summed<N: Number>(&self, out: &mut [N], mut make: impl FnMut(&Part, Range<usize>, Range<usize>, &mut [N])) {
         let mut own = Vec::new();
         for (s, (part, profiles, bins)) in self.places().enumerate() {
@@ -172,7 +172,7 @@ impl Response {
         depths
     }
 
-    /// The same of a star that changes: profile k sees the brightness map in column k (pixels, profiles).
+    /// The same for an evolving star: profile k sees the brightness map in column k (pixels, profiles).
     pub fn depths_of_each(&self, brightness: &DMatrix<f64>) -> Vec<f64> {
         assert_eq!(brightness.shape(), (self.pixels(), self.profiles()), "a map of each profile");
         let mut depths = vec![0.0; self.data_len()];

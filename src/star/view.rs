@@ -1,4 +1,4 @@
-//! Which pixels one observation sees: those of each ring that the star has turned to the visible side.
+//! The visible pixels of one observation: those of each ring on the visible side.
 //!
 //! The orbit and vsys shift a whole profile and are added in `response`.
 
@@ -22,15 +22,14 @@ pub struct Viewer {
     vsini: f64,
 }
 
-/// Rings of pixels, each with so many evaluation points, as they turn before the observer.
+/// Rings of pixels, each with this many evaluation points, as they rotate for the observer.
 pub struct Views<'a, const POINTS: usize> {
     grid: &'a SurfaceGrid,
     /// A chunk of rings at a time.
     rings: Vec<Rings<POINTS>>,
 }
 
-/// What one observation sees: of each pixel what [`Moments`] have of it. Behind the last there are so many of weight 0
-/// as [`NOTHING`] says.
+/// The visible pixels of one observation with their [`Moments`], followed by [`NOTHING`] pixels of weight 0.
 pub struct Seen {
     /// Number of pixels.
     pub pixels: usize,
@@ -44,22 +43,22 @@ pub struct Seen {
     pub middle: Vec<f32>,
 }
 
-/// Pixels of weight 0 behind those that are seen.
+/// Number of pixels of weight 0 after the visible ones.
 pub const NOTHING: usize = 64;
 
-/// Where the rings of a grid are visible. Those that never are are left out.
+/// Visible longitudes of the rings of a grid, without those that are never visible.
 #[derive(Clone, Debug)]
 pub struct Sight {
     /// Indices of the others.
     pub rings: Vec<usize>,
-    /// Where they are, a chunk of them at a time.
+    /// Their visible longitudes, by chunks.
     horizons: Vec<Horizons>,
 }
 
-/// Where rings side by side are visible.
+/// Visible longitudes of a block of rings.
 #[derive(Clone, Debug)]
 struct Horizons {
-    /// Of the two latitudes of their evaluation points, which are the same where there is one: angular velocity, ...
+    /// For the two latitudes of their evaluation points, identical for a single one: angular velocity, ...
     angular_velocity: [[f64; CHUNK]; 2],
     /// ... and half the range of longitudes (rad) of pixels in which a point is visible.
     reach: [[f64; CHUNK]; 2],
@@ -69,20 +68,20 @@ struct Horizons {
     count: [f64; CHUNK],
 }
 
-/// Pixels beside each other of which moments are computed at a time.
+/// Adjacent pixels whose moments are computed together.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Part {
     /// Chunk of rings, and ring in it.
     ring: [u32; 2],
     /// The first of them.
     pixel: u32,
-    /// Its place among the pixels that are seen.
+    /// Its index among the visible pixels.
     place: u32,
 }
 
 impl Viewer {
-    /// The view of a star in a given state, its velocities in steps of `step_kms`; pixels weighted by `1 - mu`, too,
-    /// where the limb alone counts.
+    /// The view of a star in a given state, its velocities in steps of `step_kms`; pixels also weighted by `1 - mu`
+    /// where only the limb counts.
     pub fn new(state: &StarState, limb: LimbDarkening, limb_alone: bool, step_kms: f64) -> Self {
         let limb = limb.of_mu(limb_alone);
         let (sin_inclination, cos_inclination) = state.inclination.sin_cos();
@@ -95,8 +94,7 @@ impl Viewer {
         self.vsini * relative(0.0).max(relative(1.0))
     }
 
-    /// Where pixels of `grid` have an evaluation point within sight: `margin` (rad) beyond the limb, and nearer to the
-    /// observer.
+    /// Longitudes where pixels of `grid` have an evaluation point in view: up to `margin` (rad) beyond the limb.
     pub fn sight(&self, grid: &SurfaceGrid, margin: f64) -> Sight {
         let (mut rings, mut horizons) = (Vec::new(), Vec::new());
         for (index, ring) in grid.rings.iter().enumerate() {
@@ -106,14 +104,14 @@ impl Viewer {
             if place == 0 {
                 horizons.push(Horizons::none());
             }
-            // of two latitudes one of which is never visible the other says where the ring is
+            // if one of two latitudes is never visible, the other determines the range of the ring
             horizons.last_mut().expect("one").set(place, ring, ends.map(|end| end.unwrap_or(reach)));
             rings.push(index);
         }
         Sight { rings, horizons }
     }
 
-    /// Views of these rings of `grid`, whose pixels have so many evaluation points.
+    /// Views of these rings of `grid`, whose pixels have this many evaluation points.
     pub fn views<'a, const POINTS: usize>(&self, grid: &'a SurfaceGrid, rings: &[usize]) -> Views<'a, POINTS> {
         let chunk = |indices: &[usize]| {
             let mut chunk = Rings::new();
@@ -139,7 +137,7 @@ impl Viewer {
     }
 
     /// Angular velocity (rad/d) of a point's latitude, and half the range of longitudes (rad) of pixels in which one of
-    /// its points is within sight; nothing where none ever is.
+    /// its points is in view; `None` where none ever is.
     fn reach(&self, point: &RingPoint, margin: f64) -> Option<[f64; 2]> {
         // mu = sin(latitude) cos(i) + cos(latitude) sin(i) cos(longitude) > -sin(margin); i is between 0 and 180 deg
         let pole = point.sin_latitude * self.cos_inclination + margin.sin();
@@ -150,7 +148,7 @@ impl Viewer {
 }
 
 impl<const POINTS: usize> Views<'_, POINTS> {
-    /// Turns the star to where it is `since_epoch_d` days after its epoch.
+    /// Rotates the star to `since_epoch_d` days after its epoch.
     #[inline(always)]
     pub fn turn(&mut self, i: impl Instructions, since_epoch_d: f64) {
         for rings in &mut self.rings {
@@ -158,15 +156,15 @@ impl<const POINTS: usize> Views<'_, POINTS> {
         }
     }
 
-    /// Looks at the pixels of all `parts`, so many altogether; in cells with these middles, or in those that they lie
-    /// in.
+    /// Computes the moments of the pixels of all `parts`, of this total number; in cells with these middles, or in
+    /// those that contain them.
     #[inline(always)]
     pub fn look(&self, i: impl Instructions, parts: &[Part], pixels: usize, middles: Option<&[f32]>, seen: &mut Seen) {
         for part in parts {
             let ([chunk, ring], place) = (part.ring.map(|ring| ring as usize), part.place as usize);
             let directions = self.grid.directions.chunk(part.pixel as usize);
             let middles = middles.map(|middles| middles[place..].first_chunk().expect("a chunk of middles"));
-            // a part goes on beyond its last pixel: there is room, and the next one overwrites what comes of it
+            // a part writes beyond its last pixel: there is room, and the next one overwrites the excess
             let moments = self.rings[chunk].look(i, ring, directions, middles);
             let Seen { weight, position, spread, middle, .. } = &mut *seen;
             let Moments { weight: w, position: p, spread: s, middle: m } = moments;
@@ -188,7 +186,7 @@ impl Seen {
 }
 
 impl Part {
-    /// Writes the indices of the pixels to their places, and on beyond the last of them.
+    /// Writes the indices of the pixels to their places, and beyond the last of them.
     pub fn list(&self, pixels: &mut [u32]) {
         let pixels = pixels[self.place as usize..][..CHUNK].iter_mut();
         pixels.zip(self.pixel..).for_each(|(pixel, index)| *pixel = index);
@@ -196,12 +194,12 @@ impl Part {
 }
 
 impl Sight {
-    /// Most parts that a map of so many pixels comes in.
+    /// Largest number of parts of a map of this many pixels.
     pub fn most_parts(&self, pixels: usize) -> usize {
         pixels / CHUNK + 2 * self.rings.len()
     }
 
-    /// The pixels within sight `since_epoch_d` days after the star's epoch, and how many they are.
+    /// The pixels in view `since_epoch_d` days after the star's epoch, and their number.
     #[inline(always)]
     pub fn find_parts(&self, since_epoch_d: f64, parts: &mut Vec<Part>) -> usize {
         parts.clear();
@@ -240,8 +238,8 @@ impl Horizons {
         (self.first[ring], self.count[ring]) = (pixels.start as u32, pixels.len() as f64);
     }
 
-    /// First pixel of each ring that is visible, counted from the ring's first, and how many are, some of them perhaps
-    /// at the ring's beginning.
+    /// First pixel of each ring that is visible, counted from the ring's first, and their number, wrapping to the
+    /// ring's beginning.
     #[inline(always)]
     fn visible(&self, since_epoch_d: f64) -> [[u32; CHUNK]; 2] {
         let Horizons { angular_velocity, reach, count, .. } = self;
@@ -259,18 +257,18 @@ impl Horizons {
 }
 
 /// Of a ring's pixels those with centres between two longitudes (rad), which may be any number of turns away: the
-/// first, and how many. A ring of one pixel may have it anywhere, and gives it always.
+/// first, and their number. A ring of one pixel always returns it.
 #[inline(always)]
 fn between(count: f64, from: f64, to: f64) -> [f64; 2] {
     let place = |longitude: f64| longitude * count / TAU - 0.5;
     let (from, to) = (place(from).ceil(), place(to).floor() + 1.0);
     let all = count == 1.0 || to - from >= count;
-    // at angles beyond all meaning it is any of them, but one of them: pixels are not checked again
+    // at meaninglessly large angles the result is arbitrary but valid: pixels are not checked again
     let start = (from - count * (from / count).floor()).max(0.0).min(count - 1.0);
     if all { [0.0, count] } else { [start, (to - from).max(0.0)] }
 }
 
-/// A small number that is not negative, as an integer, in a way that vectors know.
+/// A small number that is not negative, as an integer, by operations that vectorise.
 #[inline(always)]
 fn whole(x: f64) -> u32 {
     (x + INTEGERS).to_bits() as u32

@@ -1,8 +1,8 @@
 //! The Voigt profile by the Faddeeva function `w(z) = exp(-z^2) erfc(-i z)`: `Re w` at `z = (v + i gamma) / (sqrt(2)
 //! sigma)`.
 //!
-//! Weideman (1994, SIAM J. Numer. Anal. 31, 1497), a rational function good to 1e-13 in the upper half plane, with 40
-//! terms; far out the asymptotic series. Derivatives by `w' = -2 z w + 2i/sqrt(pi)`.
+//! Weideman (1994, SIAM J. Numer. Anal. 31, 1497), a rational function accurate to 1e-13 in the upper half plane, with
+//! 40 terms; far out the asymptotic series. Derivatives by `w' = -2 z w + 2i/sqrt(pi)`.
 
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_2_SQRT_PI, PI, SQRT_2};
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 /// Terms of the rational function.
 const TERMS: usize = 40;
 
-/// Beyond this `|z|^2` the asymptotic series is good to 1e-13.
+/// Beyond this `|z|^2` the asymptotic series is accurate to 1e-13.
 const FAR: f64 = 100.0;
 
 /// The parameter `2^(-1/4) N^(1/2)` of the rational function, and its coefficients.
@@ -47,7 +47,7 @@ fn faddeeva(z: Complex<f64>) -> Complex<f64> {
 
 /// `f`, and its fourth and sixth derivatives with respect to x, of `f(x) = Re w((x + i y) / sqrt(2))`: the Voigt
 /// profile of a Gaussian of standard deviation 1 and a Lorentzian of half width y, times `sqrt(2 pi)`. Far out, where
-/// both derivatives are below 1e-3, they are left out: they only ever enter with factors of 1e-5 and less.
+/// both derivatives are below 1e-3, they are left out: they only enter with factors of 1e-5 and less.
 pub fn even_derivatives(x: f64, y: f64) -> [f64; 3] {
     let z = Complex::new(x, y) / SQRT_2;
     let mut derivatives = [Complex::from(0.0); 7];

@@ -1,4 +1,4 @@
-//! `batch` and the scripts for SLURM as users run them, without SLURM; and what a scheduler's signals do.
+//! `batch` and the scripts for SLURM as users run them, without SLURM; and a scheduler's signals.
 
 use crate::desk::{Desk, dimcmc, says, star, text};
 use serde_json::{Value, json};
@@ -55,7 +55,7 @@ fn stars_of_a_batch_are_those_of_sample() {
     }
     let rows = desk.json("stars/batch.json");
     assert_eq!(rows[1]["parameters"], desk.json("2/summary.json")["parameters"]);
-    // what is done is left alone: the same bytes again, and no file touched
+    // finished results are not touched: the same bytes again, and no file touched
     let touched = || std::fs::metadata(desk.path("stars/star_2/summary.json")).unwrap().modified().unwrap();
     let before = touched();
     assert_eq!(desk.succeed(&["batch", "stars.txt", "--out", "stars"]), table);
@@ -75,7 +75,7 @@ fn a_star_that_fails_stops_no_other() {
     assert_eq!(text(&output.stderr), "error: 3 of 4 stars have no chain\n");
     says(&text(&output.stdout), &["bad: bad.json: ", "absent: absent.json: ", "hopeless: ", "floor", "star_1  k_kms"]);
     assert_eq!(desk.json("stars/batch.json")[1]["end"], "sampled");
-    // another config than the one that the run was begun with
+    // another config than that of the run
     let mut other = config(1);
     other["parameters"]["k_kms"]["max"] = json!(0.9);
     desk.write("star_1.json", &other.to_string());
@@ -148,7 +148,7 @@ fn the_scripts_do_what_they_say() {
     assert_eq!(desk.json("stars/batch.json")[2]["end"], "sampled");
 }
 
-/// The script hands the warning on, and its code says what the program's does.
+/// The script forwards the warning, and returns the program's code.
 #[test]
 fn a_script_that_is_warned_is_gone_on_with() {
     let desk = Desk::new(config(7));

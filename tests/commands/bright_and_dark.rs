@@ -1,5 +1,5 @@
-//! Images of bright and dark pixels: derivatives, optimality, the limit in which they are those of spots, faculae where
-//! they were put, and every command with them.
+//! Images of bright and dark pixels: derivatives, optimality, the limit in which they equal those of spots, recovered
+//! positions of faculae, and every command with them.
 
 use crate::desk::{Desk, says, two_spots};
 use dimcmc::internals::data::config::Config;
@@ -55,7 +55,7 @@ fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     problem.linearise(&b);
     problem.gradient(&mut gradient);
     problem.curvature(Curvature::Exact, &v, &mut curved);
-    // differences are good to h^2 and to rounding over h
+    // differences are accurate to h^2 and to rounding over h
     assert!((dot(&gradient, &v) / ((chi2_plus - chi2_minus) / (4.0 * h)) - 1.0).abs() < 1e-6);
     assert!((dot(&curved, &w) / ((slope_plus - slope_minus) / (2.0 * h)) - 1.0).abs() < 1e-6);
 }
@@ -81,7 +81,7 @@ fn the_solution_meets_its_optimality_conditions_and_shows_what_is_there() {
     let rms = b.iter().zip(area).map(|(b, a)| a * (b - 1.0).powi(2)).sum::<f64>().sqrt();
     assert!((rms / solution.spottedness - 1.0).abs() < 1e-9);
 
-    // what can be seen of the star: correlation with the truth, and means over what was injected
+    // the visible part of the star: correlation with the truth, and means over what was injected
     let (truth, latitude) = (scene.true_map().unwrap(), &imager.grid.latitude);
     let seen: Vec<usize> = (0..b.len()).filter(|&p| latitude[p] > -0.35).collect();
     let mean = |map: &[f64]| seen.iter().map(|&p| map[p]).sum::<f64>() / seen.len() as f64;
@@ -110,7 +110,7 @@ fn the_solution_meets_its_optimality_conditions_and_shows_what_is_there() {
 
 /// Of faint features both entropies are quadratic: with a default filling factor of one half, `-S` of spots is `2 a (s
 /// - 1/2)^2`, and that of brightnesses `a (B/B0 - 1)^2 / 2` with `B0` the brightness at one half. Images and ln L are
-///   the same then, and lambda differs by the factor `4 (B0 / (1 - c))^2`. What is left is of third order: the
+///   the same then, and lambda differs by the factor `4 (B0 / (1 - c))^2`. The remainder is of third order: the
 ///   features, 1e-3.
 #[test]
 fn faint_features_look_the_same_to_both_models() {
@@ -197,8 +197,8 @@ fn every_command_takes_it_and_the_injected_orbit_is_found() {
     let svg = desk.read("map/figures/map.svg");
     assert!(svg.contains("injected-facula") && svg.contains("brightness over that of the photosphere"));
 
-    // chain, paraboloid and blind search know the injected K, within errors that are as large as those of a star with
-    // spots alone
+    // chain, paraboloid and blind search recover the injected K, with uncertainties like those of a star with only
+    // spots
     let k = &desk.json("sample/summary.json")["parameters"]["k_kms"];
     let [low, high] = [0, 1].map(|i| k["ci95"][i].as_f64().unwrap());
     let sd = k["sd"].as_f64().unwrap();
@@ -212,7 +212,7 @@ fn every_command_takes_it_and_the_injected_orbit_is_found() {
     );
     let best = &desk.json("periodogram/periodogram.json")["best"];
     println!("K {k}, paraboloid {vertex} +- {error}, blind {best}");
-    // a landscape of the other model is another one
+    // the likelihood grid of the other model differs
     let mut other = config();
     other["imaging"] = json!({ "pixels": 300, "chi2_target": 4.0, "objective": "spottedness" });
     desk.write("other.json", &other.to_string());

@@ -1,4 +1,4 @@
-//! The program as users run it: what commands write, and one clear line for everything that can be wrong.
+//! The program as users run it: what commands write, and one clear line for every error.
 
 use crate::desk::{Desk, dimcmc, says, star, text, with_line};
 use serde_json::{Value, json};
@@ -249,7 +249,7 @@ fn lo_peg_has_a_map() {
         println!("skipped: {} is not there", data.display());
         return;
     }
-    // the shipped config, whose own path to the data holds where the repository lies beside them
+    // the shipped config, whose path to the data is valid where the repository is beside them
     let mut config: Value = serde_json::from_slice(&std::fs::read(root.join("configs/lopeg.json")).unwrap()).unwrap();
     config["observations"]["path"] = json!(data);
     let folder = tempfile::tempdir().unwrap();
@@ -267,7 +267,7 @@ fn lo_peg_has_a_map() {
     assert!((0.01..0.25).contains(&number("spottedness")), "{}", number("spottedness"));
 }
 
-/// A full disk is a failure, a reader that has seen enough is none.
+/// A full disk is a failure, a closed pipe is not.
 #[test]
 #[cfg(target_os = "linux")]
 fn what_cannot_be_printed_is_a_failure() {
@@ -288,7 +288,7 @@ fn what_cannot_be_printed_is_a_failure() {
     }
 }
 
-/// What only repeats the paper is a program of its own; whoever looks for it here is told where it is.
+/// Repeating the paper's experiments is a separate program; the message here names it.
 #[test]
 fn a_command_that_moved_says_where() {
     for args in [&["reproduce", "R1", "--quick"][..], &["--quiet", "reproduce", "--list"], &["help", "reproduce"]] {

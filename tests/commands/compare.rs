@@ -1,5 +1,5 @@
-//! `compare` as users run it: chain, paraboloid and landscape agree on one posterior, and what does not belong together
-//! is refused.
+//! `compare` as users run it: chain, paraboloid and likelihood grid agree on one posterior, and mismatched results are
+//! refused.
 
 use crate::desk::{Desk, says, two_spots};
 use crate::shared;
@@ -9,14 +9,14 @@ const CONFIG: &str = "config.json";
 
 const FILE: &str = "comparison.json";
 
-/// Error bars are 0.0097 (K) and 0.0083 (phi): nodes are one of them apart.
+/// Error bars are 0.0097 (K) and 0.0083 (phi): the nodes have that spacing.
 fn config() -> Value {
     let mut config = two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 400, "ess": 1000, "rhat": 1.02 }));
     config["grid"] = json!({ "axes": { "k_kms": [0.15, 0.25, 11], "phi": [-0.05, 0.04, 11] } });
     config
 }
 
-/// A desk with a run in `run` and a landscape in `grid`.
+/// A desk with a run in `run` and a likelihood grid in `grid`.
 fn both(config: Value) -> Desk {
     let desk = Desk::new(config);
     desk.succeed(&["sample", CONFIG, "--out", "run"]);
@@ -28,7 +28,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value}"))
 }
 
-/// The landscape of the config changed so.
+/// The likelihood grid of the config with this change.
 fn other_grid(desk: &Desk, pointer: &str, value: Value) {
     desk.set(pointer, value);
     desk.succeed(&["grid", CONFIG, "--out", "other", "--force"]);
@@ -60,7 +60,7 @@ fn chain_paraboloid_and_landscape_agree() {
             let (difference, ratio) = (number(&one[by]["difference"]), number(&one[by]["width_ratio"]));
             assert!(difference.abs() < apart && (ratio - 1.0).abs() < wider, "{name} by {by}: {difference} {ratio}");
         }
-        // twice what chance exceeds once in twenty times
+        // twice the value that chance exceeds once in twenty times
         let distance = &one["distribution"];
         assert!(number(&distance["largest"]) < 2.0 * number(&distance["by_chance95"]), "{name}: {distance}");
         assert!((0.7..1.5).contains(&number(&one["spacing"])), "{name}: {}", one["spacing"]);
@@ -85,7 +85,7 @@ fn chain_paraboloid_and_landscape_agree() {
     desk.succeed(&["compare", "run", "grid", "--out", "a", "--force"]);
     assert!(desk.inventory() == before);
 
-    // the nodes of the paraboloid are those that were asked for
+    // the nodes of the paraboloid are those that were requested
     desk.succeed(&["grid", CONFIG, "--out", "grid", "--resume", "--fit-nodes", "15"]);
     assert_eq!(compared(&desk, "grid").1["cost"]["landscape"]["paraboloid_nodes"], 15);
 }
@@ -129,13 +129,13 @@ fn what_the_grid_leaves_out_is_said() {
     other_grid(&desk, "/grid/axes", json!({ "k_kms": [0.1, 0.3, 5], "phi": [-0.05, 0.04, 11] }));
     says(&compared(&desk, "other").0, &["note: the grid is coarse (node spacing", "k_kms 5."]);
 
-    // none of it: the run's prior ends before the grid begins
+    // no part of it: the run's prior ends before the grid begins
     other_grid(&desk, "/grid/axes", json!({ "k_kms": [1.1, 1.2, 3], "phi": [-0.05, 0.04, 3] }));
     let (_, found) = compared(&desk, "other");
     let k = &found["parameters"]["k_kms"];
     assert_eq!((&found["outside"], &k["landscape"], &k["distribution"]), (&json!(1.0), &Value::Null, &Value::Null));
 
-    // a chain that is not long enough, and its landscape as well
+    // a chain that is not long enough, and its likelihood grid as well
     desk.set("/sampler/steps", json!(12));
     desk.succeed(&["sample", CONFIG, "--out", "run", "--force"]);
     let (table, found) = compared(&desk, "grid");
@@ -182,7 +182,7 @@ fn what_does_not_belong_together_is_refused() {
         other_grid(&desk, pointer, value);
         refused(&[what]);
     }
-    // what only steers the chain does not matter
+    // keys that only steer the chain do not matter
     other_grid(&desk, "/sampler/seed", json!(5));
     let as_it_was = desk.read("other/landscape.json");
     // several maps where the same profiles have one in the run

@@ -70,8 +70,7 @@ fn two_spectrographs_from_files_to_a_chain() {
     says(&desk.read("run/report.html"), &["blue: 6 profiles", "red: 7 profiles"]);
 }
 
-/// The systemic velocity free and held: what is not known of it is not known of the offset, and is no error of single
-/// velocities.
+/// The systemic velocity free and fixed: its uncertainty enters that of the offset, but not that of single velocities.
 #[test]
 fn what_profiles_have_in_common_is_told_apart() {
     const PRIOR_SD_KMS: f64 = 0.577;
@@ -109,7 +108,7 @@ fn what_profiles_have_in_common_is_told_apart() {
     assert_eq!(held.get("systemic_velocity"), None);
     let [vsys, sigma_vsys] = velocity(&free["systemic_velocity"]);
     assert!(vsys.abs() < 3.0 * sigma_vsys && sigma_vsys < 0.3 * PRIOR_SD_KMS, "{vsys} +- {sigma_vsys}");
-    // velocities and their covariance alone give the orbit, and no error is that of the systemic velocity
+    // velocities and their covariance are enough for the orbit, and no uncertainty is that of the systemic velocity
     let rows = |file: &str, head: usize| -> Vec<Vec<f64>> {
         let text = desk.read(file);
         text.lines().skip(head).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
@@ -125,7 +124,7 @@ fn what_profiles_have_in_common_is_told_apart() {
     assert!((ab.norm() / number(&free["best"]["k_kms"]) - 1.0).abs() < 0.01, "{} {}", ab.norm(), free["best"]);
     desk.succeed(&["plot", "free"]);
     let figure = desk.read("free/figures/rv.svg");
-    // two digits of its error
+    // two digits of its uncertainty
     let digits = (1.0 - number(&free["best"]["sigma_period_d"]).log10().floor()) as usize;
     let period = format!("{:.digits$} d = ", number(&free["best"]["period_d"]));
     assert!(
@@ -148,12 +147,12 @@ fn an_orbit_is_put_into_all_sets() {
     let orbit = ["--k-kms", "0.7", "--porb-over-prot", "1.7", "--phi", "0.3"];
     let said = desk.succeed(&[&["inject", "star.json", "--out", "injected"][..], &orbit].concat());
     says(&said, &["13, shifted by up to 0.6"]);
-    // its start is not the orbit put in, and what the sets say of themselves stays
+    // its start is not the injected orbit, and the keys of the sets are kept
     let written = desk.json("injected/config.json");
     assert_eq!(written["planet"]["k_kms"], 0.15);
     assert_eq!(written["observations"][1]["zero_point_kms"], "fitted");
     assert_eq!(written["observations"][1]["path"], "red/observations.txt");
-    // first moments have the noise of each profile, and what the ends of its window cut off
+    // first moments have the noise of each profile, and the loss at the ends of its window
     let (before, after) = (mean_velocities(&desk, "star.json"), mean_velocities(&desk, "injected/config.json"));
     let of_set =
         |name: &str| desk.json(&format!("injected/{name}/truth.json"))["velocity_kms"].as_array().unwrap().clone();
@@ -167,7 +166,7 @@ fn an_orbit_is_put_into_all_sets() {
     desk.succeed(&["plot", "injected/red"]);
 }
 
-/// Two spectrographs in two seasons, of a star that does not change in either.
+/// Two spectrographs in two seasons, with static spots in each.
 fn unchanging() -> Value {
     let mut config = two_sets();
     config["imaging"] = json!({ "pixels": 200, "chi2_target": 1.05, "objective": "spottedness" });
@@ -221,7 +220,7 @@ fn sets_that_count_other_days_are_refused() {
     says(&message, &["observations[1]", "one time system", "MJD is JD - 2400000.5"]);
 }
 
-/// A profile of one spectrograph every 63 d between those of the other: a map of each alone would leave nothing over.
+/// A profile of one spectrograph every 63 d between those of the other: a map of each alone would leave no residuals.
 #[test]
 fn errors_are_measured_with_maps_of_the_seasons_of_all_sets() {
     let mut config = unchanging();
@@ -350,7 +349,7 @@ fn what_makes_no_sense_is_refused_by_its_key() {
     says(&desk.refusal(&["map", "star.json", "--out", "map"]), &["observations[1]", "either all"]);
 }
 
-/// Spots that are fainter in the infrared: their contrast there is found, and nothing else is.
+/// Spots of lower contrast in the infrared: only their contrast there is fitted.
 #[test]
 fn the_contrast_of_a_second_set_is_fitted() {
     let mut simulated = two_sets();
@@ -387,7 +386,7 @@ fn the_contrast_of_a_second_set_is_fitted() {
     refused(1, "limb_darkening", wrong, "observations[1].limb_darkening.coefficients: 1.3 must be from 0 to 1");
 }
 
-/// A jitter for each set is one of its velocities alone; an offset of a night is that of its profiles together.
+/// A jitter of a set applies only to its velocities; an offset of a night is common to its profiles.
 #[test]
 fn sets_have_their_jitters_and_nights_their_offsets() {
     let mut simulated = two_sets();

@@ -1,4 +1,4 @@
-//! `export` as users run it: what is in the files, what other programs read there, and what is refused.
+//! `export` as users run it: content of the files, reading by other programs, and refusals.
 
 use crate::desk::{Desk, dimcmc, says, text, two_spots};
 use crate::shared::{self, ENSEMBLES, WALKERS};
@@ -17,7 +17,7 @@ fn small() -> Desk {
     desk
 }
 
-/// Steps of the run, the start among them.
+/// Steps of the run, including the start.
 fn steps(desk: &Desk) -> usize {
     desk.lines("run/chain.jsonl") / (ENSEMBLES * WALKERS)
 }
@@ -194,7 +194,7 @@ fn the_hdf5_file_holds_the_chain_step_by_step() {
         bytes.windows(wanted.len()).any(|window| window == wanted)
     };
     assert!(holds(later.iter().map(|record| number(&record["log_prob"])).collect()));
-    // blobs: what follows from the parameters comes after ln_evidence, as in the last columns of csv
+    // blobs: derived quantities come after ln_evidence, as in the last columns of csv
     desk.succeed(&["export", "run", "--format", "csv"]);
     let csv = desk.read("run/chain.csv");
     let derived = csv.lines().skip(1 + ENSEMBLES * WALKERS).map(|line| {

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
 
-/// 5 % of a rotation: spots in the middle of the disc move by eight bins meanwhile.
+/// 5 % of a rotation: spots in the middle of the disc move by eight bins in that time.
 const EXPOSURE_S: f64 = 4320.0;
 
 /// A star with small dark spots and a planet, exposed for long.
@@ -66,7 +66,7 @@ fn a_planet_behind_long_exposures() {
     desk.write("data/observations.txt", &bare);
     assert_eq!(map("key.json", "key"), with);
     assert_eq!(desk.read("key/profiles.csv"), desk.read("list/profiles.csv"), "the key is as good as the list");
-    // 8 % of the data tell of the spots; without exposure times chi2 rises by 0.09, and ln Z falls by 80
+    // spots use up 8 % of the data; without exposure times chi2 rises by 0.09, and ln Z falls by 80
     let without = map("star.json", "none");
     assert!((with.0 - 0.92).abs() < 0.04 && without.0 > with.0 + 0.05, "{with:?} {without:?}");
     assert!(without.1 < with.1 - 40.0, "{with:?} {without:?}");

@@ -1,5 +1,5 @@
-//! What users and systems do to a program: streams that are gone, signals at any time, full disks, missing permissions,
-//! numbers beyond sense, `--force` into the wrong place, edited results, control characters in names.
+//! Faults by users and systems: closed streams, signals at any time, full disks, missing permissions, absurd numbers,
+//! `--force` into the wrong place, edited results, control characters in names.
 
 use crate::desk::{Desk, PROGRAM, dimcmc, program, says, text, tiny};
 use serde_json::{Value, json};
@@ -29,7 +29,7 @@ fn code(mut child: Child) -> Option<i32> {
     child.wait().unwrap().code()
 }
 
-/// A terminal's end that swallows nothing (a full disk), and a pipe that nobody reads.
+/// A stream that accepts nothing (a full disk), and a pipe without a reader.
 #[cfg(target_os = "linux")]
 fn broken() -> [Stdio; 2] {
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
@@ -84,7 +84,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
         send("TERM", &child);
         assert_eq!(code(child), Some(75), "stream {k}, after the first step");
     }
-    // what is wrong has its exit code, whoever listens
+    // an error has its exit code, whatever the streams
     for stderr in broken() {
         let mut command = program();
         let child =
@@ -124,7 +124,7 @@ fn a_signal_at_any_time_is_told_to_the_scheduler() {
             assert!(!desk.path("early").exists(), "{command}");
         }
     }
-    // while orbits go the whole way
+    // while orbits go through the full pipeline
     let desk = Desk::new(tiny(2));
     let args = ["limits", "config.json", "--out", "l", "--draws", "1000", "--periods", "3", "--amplitudes", "3"];
     let mut child = desk.start(&[&args[..], &["--phases", "2", "--full", "60000", "--quiet"]].concat());
@@ -374,7 +374,7 @@ fn force_spares_what_the_command_reads() {
     says(&desk.refusal(&["simulate", "data/truth.json", "--out", "data", "--force"]), &["data/truth.json would be"]);
     desk.write("fit.json", &desk.config.to_string());
     says(&desk.refusal(&["map", "fit.json", "--out", ".", "--force"]), &["fit.json would be replaced"]);
-    // what is not read is replaced as ever
+    // files that are not read are replaced as usual
     desk.succeed(&["map", "data/config.json", "--out", "data", "--force"]);
     desk.write("data/mine.csv", "precious");
     says(&desk.refusal(&["report", "data", "--out", "data/mine.csv", "--force"]), &["no report"]);

@@ -27,7 +27,7 @@ fn no_kept_file_makes_its_reader_panic() {
     assert!(failed.is_empty(), "{failed:?}");
 }
 
-/// What is read in time that grows with the square of the length of a line takes hours for these.
+/// A reader quadratic in the length of a line takes hours for these.
 #[test]
 fn lines_of_any_length_are_read_at_once() {
     let folder = tempfile::tempdir().unwrap();

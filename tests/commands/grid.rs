@@ -44,7 +44,7 @@ fn line() -> Value {
     config
 }
 
-/// A desk with a finished landscape in `whole`.
+/// A desk with a finished likelihood grid in `whole`.
 fn finished(config: Value) -> Desk {
     let desk = Desk::new(config);
     desk.succeed(&["grid", CONFIG, "--out", "whole"]);
@@ -96,7 +96,7 @@ fn the_landscape_is_that_of_the_chain() {
     says(&table, &["truth", "k_kms", "0.2100", "at node 27", "48 reconstructions", "0 failed", "48 nodes in"]);
     says(&table, &["may lie outside: widen grid.axes.phi\n", "landscape.json, landscape.jsonl, paraboloid.json"]);
 
-    // every value is that of the posterior without its prior, parameters told apart by name
+    // every value is that of the posterior without its prior, parameters identified by name
     let scene = Scene::load(&desk.path(CONFIG)).unwrap();
     let place = |node: &Value| scene.space.names().iter().map(|name| node[name].as_f64().unwrap()).collect();
     let thetas: Vec<Vec<f64>> = nodes.iter().map(place).collect();
@@ -110,7 +110,7 @@ fn the_landscape_is_that_of_the_chain() {
             assert_eq!(evaluation.status, Status::OutsidePrior);
             continue;
         }
-        // ln L and prior are added and taken apart again
+        // ln L and prior are added and separated again
         let expected = evaluation.log_prob - scene.space.log_prior(theta);
         assert!((log_likelihood[index] - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{node}");
         assert_eq!(json!([node["spottedness"], node["chi2"]]), json!(evaluation.numbers));
@@ -134,7 +134,7 @@ fn the_landscape_is_that_of_the_chain() {
             ("lambda", image.image.lambda),
         ];
         for (key, expected) in expected {
-            // a node is right to 1e-3 in ln L, its image to a few times that in lambda
+            // a node is accurate to 1e-3 in ln L, its image to a few times that in lambda
             let found = node[key].as_f64().unwrap();
             assert!((found / expected - 1.0).abs() < 5e-3, "{node}, {key}: {found} {expected}");
         }
@@ -258,8 +258,8 @@ fn a_phase_axis_may_wrap_or_go_once_around() {
     }
 }
 
-/// The paraboloid beside the landscape: its error bar is that of the curvature at the best parameters, for which the
-/// search has derivatives; and the user may say which nodes.
+/// The paraboloid of the likelihood grid: its error bar is that of the curvature at the best parameters, for which the
+/// search has derivatives; and the user may choose the nodes.
 #[test]
 fn the_paraboloid_is_the_curvature() {
     let mut config = config();

@@ -1,5 +1,4 @@
-//! `dimcmc import`: ZDIpy's star in this program's terms, what has no counterpart, and every way in which its files can
-//! be wrong.
+//! `dimcmc import`: ZDIpy's star in this program's terms, settings without a counterpart, and all errors of its files.
 
 use crate::desk::{Desk, says, with_line};
 use serde_json::{Value, json};
@@ -186,7 +185,7 @@ fn other_layouts_and_no_line_file() {
     desk.succeed(&args("strong.json"));
     let width = desk.json("strong.json")["star"]["line"]["equivalent_width_kms"].as_f64().unwrap();
     assert!((width - strength(1.02)).abs() < 1e-4, "{width}");
-    // without it the line is assumed, and said to be; options replace what files say
+    // without it the line is assumed and reported as such; options replace what files say
     std::fs::remove_file(desk.path("zdi/model-voigt-line.dat")).unwrap();
     let table = desk.succeed(&[
         "import",
@@ -319,7 +318,7 @@ fn zdipys_own_example_reaches_its_target() {
     assert!((chi2 / target - 1.0).abs() < 1e-3, "{fit}");
 }
 
-/// A profile given as 1 - I is said to be by every command that reads it, and in results.
+/// Every command that reads a profile given as 1 - I reports it, as do results.
 #[test]
 fn what_was_made_of_profiles_is_said() {
     let desk = desk();

@@ -1,11 +1,11 @@
-//! Activity indicators from their tables to a map; and what is refused.
+//! Activity indicators from their tables to a map; and refusals.
 
 use super::desk::{Desk, says};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
 
-/// A star with profiles of a week, and a light curve that its indicator is made of.
+/// A star with profiles of a week, and a light curve from which its indicator is made.
 fn star() -> Value {
     let cycles: Vec<f64> = (0..9).map(|k| 0.31 * f64::from(k)).collect();
     json!({
@@ -44,7 +44,7 @@ fn an_indicator_from_its_table_to_a_map() {
     let (desk, values) = desk();
     let rows: String = values.iter().map(|[t, v]| format!("{t}\t{v}\t0.001\n")).collect();
     desk.write("data/halpha.rdb", &format!("# H alpha\nbjd\thalpha\terr_halpha\n---\t---\t---\n{rows}"));
-    // values that have nothing to do with spots
+    // values unrelated to spots
     let rows: String = (0..values.len()).map(|k| format!("{} {} 1\n", values[k][0], (k * k * 7 % 11) as f64)).collect();
     desk.write("data/noise.txt", &format!("JD value sigma\n{rows}"));
     let both = json!([{ "name": "halpha", "path": "data/halpha.rdb" }, { "path": "data/noise.txt" }]);
@@ -61,7 +61,7 @@ fn an_indicator_from_its_table_to_a_map() {
     // it goes with the amplitude of the spots, which is held
     assert!((-0.6..-0.25).contains(&number(0, "gain")) && number(0, "ln_bayes") > 10.0, "{found}");
     assert_eq!(number(1, "gain"), 0.0);
-    // the one that counts is tabled with what the maps make of it, and drawn by its name
+    // the used one is tabulated with its prediction by the maps, and drawn by its name
     let table = desk.read("map/indicators.csv");
     assert_eq!(table.lines().next(), Some("time_d,value,sigma,model,residual,indicator"));
     let rows: Vec<Vec<f64>> =

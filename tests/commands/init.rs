@@ -1,5 +1,5 @@
-//! `dimcmc init`: the config that it writes is taken by the other commands as it is, its values are those of the star,
-//! and nothing that is not known is passed over in silence.
+//! `dimcmc init`: other commands accept its config without changes, its values are those of the star, and every unknown
+//! value is reported.
 
 use crate::desk::{Desk, dimcmc, says, text};
 use serde_json::{Value, json};
@@ -37,7 +37,7 @@ pub fn desk() -> Desk {
 pub const INIT: [&str; 8] =
     ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "50", "--pixels", "300"];
 
-/// With the objective that is tried out in no time, where what the profiles say is the question.
+/// With the objective that is tested fastest, where only measurements on the profiles matter.
 pub fn quick() -> Vec<&'static str> {
     [&INIT[..], &["--objective", "spottedness"]].concat()
 }
@@ -153,7 +153,7 @@ fn options_replace_what_is_measured() {
     }
 }
 
-/// Errors five times too large, and five times too small: the continuum says so.
+/// Errors five times too large, and five times too small: as measured on the continuum.
 #[test]
 fn wrong_errors_are_scaled() {
     for (scale, expected) in [(5.0, 0.2), (0.2, 5.0)] {
@@ -256,7 +256,7 @@ fn continua_that_wander_are_let() {
     desk.succeed(&["map", "star.json", "--out", "map"]);
 }
 
-/// The wrong vsini is named, with a better one, whether errors are measured or given.
+/// The wrong vsini is reported, with a better one, whether uncertainties are measured or given.
 #[test]
 fn a_map_that_does_not_fit_says_why() {
     let desk = desk();
@@ -283,7 +283,7 @@ fn a_map_that_does_not_fit_says_why() {
     );
 }
 
-/// With a vsini that is far from the measured one nothing fits: the measured one is written, and that is said.
+/// With a vsini far from the measured one nothing fits: the measured one is written, and this is reported.
 #[test]
 fn a_vsini_of_another_star_is_put_right() {
     let desk = desk();
@@ -299,8 +299,8 @@ fn a_vsini_of_another_star_is_put_right() {
     assert!((number(&desk.json("star.json"), "/star/vsini_kms") - 25.0).abs() < 1.2);
 }
 
-/// A line that is too broad for the profiles is put right by the fit that `init` asks for; a config that trusts it gets
-/// maps with the reason why they are none of the star.
+/// A line that is too broad for the profiles is corrected by the fit that `init` requests; a config that fixes it gets
+/// maps with the reason why they are invalid.
 #[test]
 fn a_line_that_is_wrong_is_put_right_or_named() {
     let desk = desk();
@@ -370,7 +370,7 @@ fn continua_that_are_tilted_are_let() {
     desk.succeed(&["map", "star.json", "--out", "map"]);
 }
 
-/// Variances in place of standard deviations are named, not put right.
+/// Variances in place of standard deviations are reported, not corrected.
 #[test]
 fn variances_are_named() {
     const SAID: &str = "the uncertainties of the profiles look like variances: they are 1.1e-5";
@@ -412,7 +412,7 @@ fn double_lines_are_named() {
     assert!(!message.contains("likely reason"), "{message}");
 }
 
-/// Evolving maps are as bright and as dark as the profiles say: nothing is to be chosen.
+/// Evolving maps are bright and dark as the profiles require: there is no choice to make.
 #[test]
 fn brightness_is_for_static_maps() {
     let desk = desk();
@@ -576,7 +576,7 @@ fn what_cannot_be_is_refused_in_a_line() {
     assert_ne!(desk.read("star.json"), "precious");
 }
 
-/// A single profile, or two at the same time, say nothing of spots and periods; two within minutes are enough for the
+/// A single profile, or two at the same time, do not constrain spots and periods; two within minutes are enough for the
 /// rest.
 #[test]
 fn two_profiles_are_enough_for_a_start() {

@@ -1,5 +1,5 @@
-//! `dimcmc inject` as users run it: against a star simulated with the orbit, what stays, what is refused, and what
-//! other commands make of it.
+//! `dimcmc inject` as users run it: against a star simulated with the orbit, unchanged parts, refusals, and use by
+//! other commands.
 
 use crate::desk::{Desk, says, star};
 use dimcmc::internals::data::io::lsd;

@@ -23,7 +23,7 @@ fn init_takes_what_the_name_gives() {
     assert_eq!(config["star"]["wavelength_nm"], 700.0);
 }
 
-/// Of several lists each has its own spectrograph, and an option that is given counts for all of them.
+/// Each of several lists has its own spectrograph, and a given option applies to all of them.
 #[test]
 fn each_list_has_its_spectrograph() {
     let desk = desk();

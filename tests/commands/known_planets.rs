@@ -1,5 +1,5 @@
-//! Planets of known ephemeris: each judged beside the other, tables and figures theirs, a third one searched for beside
-//! them.
+//! Planets of known ephemeris: each with the other in the model, their tables and figures, and a search for a third
+//! one.
 
 use crate::desk::{Desk, says, star};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ const PERIODS_D: [f64; 2] = [4.9, 10.7];
 const CONJUNCTIONS_D: [f64; 2] = [1.2, 5.1];
 const K_KMS: [f64; 2] = [0.24, 0.16];
 
-/// A star whose spots change, with two planets.
+/// A star with evolving spots and two planets.
 fn config() -> Value {
     let mut star = star();
     star["mass_msun"] = json!(0.9);

@@ -1,4 +1,4 @@
-//! Light curves beside profiles: simulated, read from a table, mapped and drawn; and what is refused.
+//! Light curves beside profiles: simulated, read from a table, mapped and drawn; and refusals.
 
 use super::desk::{Desk, says};
 use serde_json::{Value, json};
@@ -67,7 +67,7 @@ fn a_light_curve_from_its_table_to_a_figure() {
     let mut lines = table.lines();
     assert_eq!(lines.next(), Some("time_d,flux,sigma,model,residual,segment,band"));
     let bins: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
-    // level and drift are no spots: what is left over is noise
+    // level and drift are not spots: the residual is noise
     let chi2: f64 = bins.iter().map(|bin| (bin[4] / bin[2]).powi(2)).sum();
     assert!(chi2 < 1.6 * bins.len() as f64, "{chi2} of {} bins", bins.len());
     let spread = |column: usize| {
@@ -124,7 +124,7 @@ fn a_wild_point_is_named_and_moves_no_planet() {
     let sigma = good[1];
     assert!((wild[0] - good[0]).abs() < 0.1 * sigma && (wild[1] / sigma - 1.0).abs() < 0.03, "{good:?} {wild:?}");
     assert!((wild[2] - good[2]).abs() < 0.01 && (wild[3] - good[3]).abs() < f64::ln(3.0), "{good:?} {wild:?}");
-    // kept, it is named where it is in the way
+    // if kept, it is named where it affects the result
     config["photometry"]["outliers"] = json!("keep");
     desk.write("star.json", &config.to_string());
     let said = desk.succeed(&["map", "star.json", "--out", "kept"]);

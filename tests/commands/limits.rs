@@ -1,5 +1,5 @@
-//! `dimcmc limits` as users run it: against the closed form of the periodogram, against the whole way, with a planet in
-//! the profiles, refusals.
+//! `dimcmc limits` as users run it: against the closed form of the periodogram, against the full pipeline, with a
+//! planet in the profiles, refusals.
 
 use crate::desk::{Desk, says, star};
 use crate::shared;
@@ -54,8 +54,8 @@ fn both_ways_and_the_closed_form_agree() {
     let table = limits(&desk, &["--full", "10", "--out", "a"]);
     says(&table, &["K 50 %", "K 95 %", "FAP < 1 %", "full pipeline:", "a: limits.csv, limits.json"]);
     let file = desk.json("a/limits.json");
-    // ten orbits within a factor of 2 of the limit, where the shortcut's second order and the noise of resampling
-    // decide
+    // ten orbits within a factor of 2 of the limit, where the second order of the linearised method and the noise of
+    // resampling decide
     assert!(file["agreement"]["agree"].as_u64().unwrap() >= 8, "{}", file["agreement"]);
     assert!(file["before"]["false_alarm_probability"].as_f64().unwrap() > 0.01);
     desk.succeed(&["periodogram", "config.json", "--min-period-d", "1.7", "--max-period-d", "15", "--out", "search"]);
@@ -64,15 +64,15 @@ fn both_ways_and_the_closed_form_agree() {
     let mut ratios = Vec::new();
     for limit in file["limits"].as_array().unwrap() {
         let period = limit["period_d"].as_f64().unwrap();
-        // spots imitate an orbit at the rotation period of 3 d, the ends of the search see half a peak
+        // spots mimic an orbit at the rotation period of 3 d, the ends of the search see half a peak
         if (period / 3.0 - 1.0).abs() < 0.3 || !(1.8..=14.0).contains(&period) {
             continue;
         }
         let nearest =
             (0..periods.len()).min_by(|a, b| (periods[*a] - period).abs().total_cmp(&(periods[*b] - period).abs()));
         let ratio = limit["k50_kms"].as_f64().unwrap() / closed[nearest.unwrap()];
-        // the closed form takes a mean over noise, here is one noise; and an orbit counts among the unresolved spots,
-        // which raises the limit
+        // the closed form is a mean over noise, here is one realisation; and an orbit contributes to the
+        // unresolved-spot noise, which raises the limit
         assert!((0.4..2.5).contains(&ratio), "{period}: {ratio}");
         ratios.push(ratio);
     }
@@ -125,8 +125,8 @@ fn a_planet_that_is_there_is_taken_out() {
     }
 }
 
-/// A star whose spots come and go, its systemic velocity and velocity jitter unknown: the search that orbits are put
-/// into is that of `periodogram`, and a search of profiles with an orbit in them finds what the shortcut says.
+/// A star with evolving spots, its systemic velocity and RV jitter unknown: orbits are injected into the search of
+/// `periodogram`, and a search of profiles with an orbit agrees with the linearised result.
 #[test]
 fn limits_are_of_the_search_that_periodogram_makes() {
     let mut config = shared::config();
@@ -139,14 +139,14 @@ fn limits_are_of_the_search_that_periodogram_makes() {
     let (search, limits) = (desk.json("search/periodogram.json"), desk.json("limits/limits.json"));
     assert_eq!(limits["before"]["false_alarm_probability"], search["verdict"]["false_alarm_probability"]);
     assert_eq!(both_ways_agree(&limits), 4);
-    // K far below its error is recovered at no phase
+    // K far below its uncertainty is recovered at no phase
     let sigma_k_kms = search["verdict"]["signal"]["sigma_k_kms"].as_f64().unwrap();
     for limit in limits["limits"].as_array().unwrap() {
         assert!(limit["k50_kms"].as_f64().is_none_or(|k| k > sigma_k_kms), "{limit}");
     }
 }
 
-/// The same star without a jitter: with an orbit that is not in the model its spots seem to live shorter.
+/// The same star without a jitter: with an orbit that is not in the model its spots seem to have a shorter lifetime.
 #[test]
 fn spots_that_absorb_an_orbit_absorb_it_in_limits() {
     let desk = Desk::new(shared::config());
@@ -155,7 +155,7 @@ fn spots_that_absorb_an_orbit_absorb_it_in_limits() {
     assert_eq!(both_ways_agree(&desk.json("limits/limits.json")), 8);
 }
 
-/// How many orbits were tried both ways; Delta ln L agrees to 20 %.
+/// Number of orbits tested by both methods; Delta ln L agrees to 20 %.
 fn both_ways_agree(limits: &Value) -> usize {
     let height = |outcome: &Value| outcome["delta_ln_l"].as_f64().unwrap();
     let comparisons = limits["comparisons"].as_array().unwrap();

@@ -1,4 +1,4 @@
-//! `map` of a star that may change, and what `plot` and `report` make of it.
+//! `map` of a star with evolving spots, and its use by `plot` and `report`.
 
 use crate::desk::{Desk, dimcmc, says, text, two_spots};
 use crate::svg::{paths, texts};
@@ -14,8 +14,8 @@ fn config() -> Value {
     config
 }
 
-/// A planet that no orbit is assumed for is taken up by the jitter: the command says so, and what to run. Of a star
-/// without a planet it says nothing of the kind.
+/// A planet without an orbit in the model is absorbed by the jitter: the command reports this, with the command to run.
+/// It does not for a star without a planet.
 #[test]
 fn velocities_that_vary_as_on_an_orbit_are_told() {
     let star = |k_kms: f64| {
@@ -69,7 +69,7 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     );
     let line = |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap();
     assert!(line("power-law index").contains(" ± "), "{said}");
-    // profiles of 5 d do not tell how long spots live
+    // profiles of 5 d do not constrain the lifetime of spots
     assert!(line("lifetime").ends_with(" d, not constrained"), "{said}");
     says(&said, &["hardly constrain the map at 10000.00 d", "written", "map.json, profiles.csv, rv.csv, fit.json"]);
     // what is read is what was written
@@ -117,7 +117,7 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     config["imaging"]["spot_lifetime_d"] = json!(20.0);
     let desk = Desk::new(config);
     let said = desk.succeed(&["map", CONFIG, "--out", "nights"]);
-    // what is given has no error
+    // given values have no uncertainty
     says(&said, &["lifetime", " 20.0 d\n"]);
     assert!(said.lines().any(|line| line.starts_with("amplitude") && line.contains(" ± ")), "{said}");
     let field = &desk.json("nights/fit.json")["field"];
@@ -125,7 +125,7 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     let number = |key: &str| field[key].as_f64().unwrap();
     assert!((0.02..0.5).contains(&(number("sigma_spot_amplitude") / number("spot_amplitude"))), "{field}");
     assert!((0.05..3.0).contains(&number("sigma_spot_slope")), "{field}");
-    // of the profiles, 0.33 to 0.51 d apart, some are in nights of their own
+    // of the profiles, 0.33 to 0.51 d apart, some are alone in a night
     assert_eq!(desk.json("nights/map.json")["maps"].as_array().unwrap().len(), 5);
     desk.succeed(&["plot", "nights"]);
     // at 20 degrees what is below latitude -20 is never seen
@@ -142,7 +142,7 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     desk.succeed(&["report", "static"]);
 }
 
-/// However many nights there are, each is drawn with its time, and colours go by what is on the star.
+/// However many nights there are, each is drawn with its time, and colours scale with the features of the star.
 #[test]
 fn every_night_is_drawn() {
     let desk = Desk::new(config());
@@ -199,7 +199,7 @@ fn what_makes_no_sense_is_one_line() {
     desk.succeed(&["map", CONFIG, "--out", "map"]);
     let map: MapFile = serde_json::from_value(desk.json("map/map.json")).unwrap();
     assert_eq!((map.maps.len(), map.maps[0].time_d, map.mean.is_some()), (1, None, true));
-    // what is broken in a file is named, and is not taken for absent
+    // damaged parts of a file are named, not treated as absent
     let written = desk.json("map/map.json");
     let mut without_maps = written.clone();
     without_maps.as_object_mut().unwrap().remove("maps");

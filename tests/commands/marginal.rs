@@ -1,4 +1,4 @@
-//! Commands with the objective `marginal-likelihood`: a star whose spots come and go within its twelve profiles.
+//! Commands with the objective `marginal-likelihood`: a star with spots evolving over its twelve profiles.
 
 use super::desk::{Desk, dimcmc, says, text, two_spots};
 use serde_json::{Value, json};
@@ -47,7 +47,7 @@ fn a_landscape_is_that_of_the_chain_with_the_field_held() {
     let said = desk.succeed(&["compare", "run", "grid", "--out", "comparison"]);
     says(&said, &["spot_amplitude, spot_slope, spot_lifetime_d fixed in the grid, sampled in the chain"]);
     assert!(!said.contains("unresolved spots"), "{said}");
-    // the paper's method beside it, of the same star and profiles
+    // for comparison the paper's method with the same star and profiles
     let mut mapped = changing(1);
     mapped["imaging"] = json!({ "pixels": 200, "chi2_target": 1.6, "objective": "spottedness" });
     mapped["grid"] = json!({ "axes": { "k_kms": [0.1, 0.3, 3], "phi": [0.9, 1.1, 3] } });
@@ -109,7 +109,7 @@ fn what_has_no_meaning_is_refused() {
         &|config| config["imaging"] = json!({ "pixels": 200, "spot_break_degree": 7, "objective": "spottedness" }),
         &["imaging.spot_break_degree", "marginal-likelihood"],
     );
-    // configs of older programs, which meant one map
+    // configs of older programs, which implied one map
     let cure = "set \"spottedness\"";
     refused(
         &|config| {

@@ -1,4 +1,4 @@
-//! `merge` as users run it: the draws of all runs and no others, and refusals of what does not belong together.
+//! `merge` as users run it: the draws of all runs and no others, and refusals of mismatched runs.
 
 use crate::desk::{Desk, says, tiny};
 use crate::shared;
@@ -50,10 +50,10 @@ fn the_whole_is_its_parts() {
     assert_eq!((&manifest["ensembles"], &manifest["merged_seeds"]), (&json!(6), &json!([3, 4, 5])));
     let summary = desk.json("all/summary.json");
     let [a, all] = [&desk.json("a/summary.json"), &summary].map(|s| s["parameters"]["k_kms"]["ess"].as_f64().unwrap());
-    // three times the draws; both numbers are estimates, good to some tens of per cent
+    // three times the draws; both numbers are estimates, accurate to some tens of per cent
     assert!(all > 1.8 * a, "{a} {all}");
 
-    // whatever takes a run takes it
+    // every command that accepts a run accepts it
     desk.succeed(&["analyse", "all"]);
     desk.succeed(&["export", "all", "--format", "csv"]);
     desk.succeed(&["plot", "all"]);
@@ -61,7 +61,7 @@ fn the_whole_is_its_parts() {
     sample(&desk, "d", "6");
     desk.succeed(&["merge", "all", "d", "--out", "more"]);
     assert_eq!(desk.json("more/manifest.json")["merged_seeds"], json!([3, 4, 5, 6]));
-    // it has no random numbers of its own to go on with
+    // it has no stream of random numbers to be resumed with
     desk.set("/sampler/ensembles", json!(6));
     says(&desk.refusal(&["sample", CONFIG, "--out", "all", "--resume"]), &["all: a merged run"]);
 }

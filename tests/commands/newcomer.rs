@@ -1,9 +1,9 @@
 //! A newcomer's first hour: init, map, periodogram, sample and report on the files of simulated stars, without a planet
 //! and with one.
 //!
-//! No claim may be made of a star without a planet, whatever its spots and its data are like, and a planet of ten
-//! standard errors is to be found. One star without a planet is for every day; all twelve, of which
-//! `results/newcomer.md` has the table, are made by
+//! No planet may be claimed for a star without one, whatever its spots and data, and a planet of ten standard errors
+//! must be found. One star without a planet runs in the regular tests; all twelve, of which `results/newcomer.md` has
+//! the table, are made by
 //!
 //!     cargo test --test commands newcomer -- --ignored --nocapture
 
@@ -19,7 +19,7 @@ struct Star {
     line_sigma_kms: f64,
     spots: Value,
     faculae: Value,
-    /// Nights, profiles a night.
+    /// Nights, profiles per night.
     nights: (usize, usize),
     snr: f64,
     correlated_bins: f64,
@@ -125,7 +125,7 @@ impl Star {
         })
     }
 
-    /// The whole path of the README; what each step says. The chain by the program's own goals, or by others.
+    /// The whole path of the README; the output of each step. The chain by the program's own goals, or by others.
     fn walked(&self, k_kms: f64, seed: u64, pixels: &str, sampler: Option<Value>) -> Walk {
         let desk = Desk::new(self.config(k_kms, seed));
         desk.succeed(&["simulate", "config.json", "--out", "data"]);
@@ -188,7 +188,7 @@ impl Star {
     }
 }
 
-/// The path and what came of it.
+/// The path and its result.
 struct Walk {
     desk: Desk,
     texts: [String; 4],
@@ -196,7 +196,7 @@ struct Walk {
 }
 
 impl Walk {
-    /// Whether search or chain says candidate or detection.
+    /// Whether search or chain reports a candidate or a detection.
     fn claims(&self) -> bool {
         self.verdicts.iter().any(|verdict| verdict["finding"] == "candidate" || verdict["finding"] == "detection")
     }
@@ -230,8 +230,8 @@ impl Walk {
     }
 }
 
-/// Nothing is claimed of a star without a planet; for the sake of time a slower one, in few nights, on few pixels and
-/// with a chain that ends early.
+/// Nothing is claimed for a star without a planet; to save time a slower one, in few nights, on few pixels and with a
+/// chain that ends early.
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn one_star() {
@@ -245,8 +245,8 @@ fn one_star() {
     says(&alone.texts[3], &["porb_over_prot is unconstrained", "phi is unconstrained", "consistent with zero"]);
 }
 
-/// A rotation period that is off by a tenth is named, with the right one, and no planet is claimed; the right one is
-/// not doubted.
+/// A rotation period that is off by a tenth is reported, with the right one, and no planet is claimed; the right one is
+/// not questioned.
 #[test]
 fn a_wrong_rotation_period_is_named() {
     let star = Star { spots: few(), vsini_kms: 20.0, nights: (8, 2), ..PLAIN };

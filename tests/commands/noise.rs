@@ -1,5 +1,5 @@
-//! Errors and target chi2 that are left to the observations: noise of known size comes back, slopes do not count,
-//! profiles that are noisier weigh less, and everything after it is as with the same numbers written down.
+//! Uncertainties and target chi2 that are left to the observations: noise of known size is recovered, slopes have no
+//! effect, noisier profiles have less weight, and all later results equal those with the same numbers given.
 
 use crate::desk::{Desk, says, star};
 use dimcmc::internals::data::io::lsd;
@@ -52,8 +52,8 @@ fn errors_quoted_too_large_are_put_right() {
     says(&table, &["errors", "rescaled by", "map residuals"]);
     let fit = desk.json("map/fit.json");
     let errors = &fit["measured"]["errors"];
-    // 20 profiles of some 24 bins of continuum know it to 1/sqrt(2 * 440), 3.4 %; a map of 620 bins to 2.8 %, and 0.97
-    // is the paper's
+    // 20 profiles of some 24 bins of continuum constrain it to 1/sqrt(2 * 440), 3.4 %; a map of 620 bins to 2.8 %, and
+    // 0.97 is the paper's
     assert!((number(&errors["continuum"]) / 0.25 - 1.0).abs() < 0.1, "{errors}");
     assert!((number(&errors["residual"]) / 0.25 - 1.0).abs() < 0.1, "{errors}");
     let scale = number(&errors["sigma_scale"]);
@@ -73,7 +73,7 @@ fn errors_quoted_too_large_are_put_right() {
     assert!(by_hand.get("measured").is_none());
 }
 
-/// Nuisances are integrated out with the errors that are tried, not with those quoted.
+/// Nuisances are marginalised over with the tested uncertainties, not with the quoted ones.
 #[test]
 fn nuisances_take_part() {
     let desk = desk(|observations| {
@@ -90,7 +90,8 @@ fn nuisances_take_part() {
     assert!((number(&errors["residual"]) / 0.25 - 1.0).abs() < 0.12, "{errors}");
 }
 
-/// The strength of the line is measured below the continuum beside it, wherever that is, where its level is a nuisance.
+/// The strength of the line is measured below the adjacent continuum, whatever its level, where that level is a
+/// nuisance.
 #[test]
 fn a_continuum_offset_is_not_counted_as_line() {
     let desk = desk(|observations| {
@@ -172,14 +173,14 @@ fn noisier_profiles_weigh_less() {
     let factors: Vec<f64> = factors.as_array().unwrap().iter().map(number).collect();
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     // each is known to 15 %, 0.02 in the variance of its logarithm, which scatters by 0.09 between such profiles: 80 %
-    // of the logarithm are left, and the means are known to 7 and 4 %
+    // of the logarithm remain, and the means are known to 7 and 4 %
     let left = (mean(&factors[..5]) / mean(&factors[5..])).log2();
     assert!((left - 0.8).abs() < 0.2, "{left}");
     let weight = mean(&factors.iter().map(|f| f.powi(-2)).collect::<Vec<_>>());
     assert!((weight - 1.0).abs() < 0.01, "the weights as a whole stay: {weight}");
 }
 
-/// What chance makes of the scatter of equal profiles, 15 % each, is not taken for a difference between them.
+/// Random differences in the rms of equal profiles, 15 % each, are not treated as real.
 #[test]
 fn equal_profiles_weigh_alike() {
     let desk = desk(|_| ());
@@ -211,8 +212,8 @@ fn without_continuum_there_are_no_weights() {
     says(&desk.refusal(&["map", "config.json", "--out", "x"]), &["observations.sigma_scale", "a number or \"auto\""]);
 }
 
-/// With the right errors the target is near 1 (a little above for few and noisy profiles), and what is left of the
-/// velocities is photon noise.
+/// With the right errors the target is near 1 (a little above for few and noisy profiles), and the residual velocities
+/// are photon noise.
 #[test]
 fn the_target_is_where_velocities_stop_shrinking() {
     let desk = desk(|_| ());
@@ -235,7 +236,7 @@ fn the_target_is_where_velocities_stop_shrinking() {
     assert_eq!(desk.read("map/fit.json"), desk.read("again/fit.json"));
 }
 
-/// Whatever is measured on them, and whoever needs them in their whole width.
+/// Whatever is measured on them, over whichever range.
 #[test]
 fn a_profile_is_opened_once_in_a_command() {
     let desk = desk(|_| ());

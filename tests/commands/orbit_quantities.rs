@@ -1,5 +1,5 @@
-//! What is usually quoted of an orbit, in every result that bears on one: period in days, times of the largest radial
-//! velocity and of inferior conjunction, minimum mass, each with its errors; and what phi is.
+//! Quoted quantities of an orbit in every relevant result: period in days, times of the largest radial velocity and of
+//! inferior conjunction, minimum mass, each with its uncertainty; and the definition of phi.
 
 use crate::desk::{Desk, says, two_spots};
 use serde_json::{Value, json};
@@ -12,8 +12,13 @@ const NAMES: [&str; 4] = ["period_d", "t_max_rv_d", "t_conjunction_d", "msini_mj
 const PROT: f64 = 3.0;
 const EPOCH: f64 = 2_459_000.5;
 
+<<<<<<< HEAD
 /// What a summary, a table and a page say of phi.
 const PHI: &str = "time from star.epoch_d to the next RV maximum, in orbital cycles";
+=======
+/// The description of phi in a summary, a table and a page.
+const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity";
+>>>>>>> words
 
 /// A star of known mass with a planet, its orbit free.
 fn config() -> Value {
@@ -39,7 +44,7 @@ fn off(difference: f64, period: f64) -> f64 {
     (difference / period - (difference / period).round()) * period
 }
 
-/// One run, everywhere it goes.
+/// One run, in all its outputs.
 #[test]
 fn a_run_gives_what_is_usually_quoted() {
     let desk = Desk::new(config());
@@ -100,14 +105,14 @@ fn a_run_gives_what_is_usually_quoted() {
     for name in ["t_max_rv_d", "t_conjunction_d"] {
         assert!((time(name) - middle).abs() < 0.55 * time("period_d"), "{name}");
     }
-    // the planet that was put in, within four standard deviations
+    // the injected planet, within four standard deviations
     let truth = [1.7 * PROT, EPOCH, EPOCH + 0.25 * 1.7 * PROT, light_planet(0.2, 1.7 * PROT, 0.9)];
     for (name, truth) in NAMES.into_iter().zip(truth) {
         assert!((time(name) - truth).abs() < 4.0 * number(&summary["derived"][name]["sd"]), "{name}");
     }
 }
 
-/// The mass decides nothing of the chain: a run goes on with one, or another, or none.
+/// The mass does not affect the chain: a run is resumed with one, or another, or none.
 #[test]
 fn the_mass_of_the_star_may_come_later() {
     let desk = Desk::new(config());
@@ -161,7 +166,7 @@ fn searches_give_it_with_errors() {
     for orbit in orbits {
         for name in ["t_max_rv_d", "t_conjunction_d", "msini_mjup"] {
             let (value, sigma) = (number(&orbit[name]), number(&orbit[&format!("sigma_{name}")]));
-            // searches of one star: the two routes to its orbit are within some of their errors
+            // searches of one star: the two methods agree within some of their uncertainties
             assert!(sigma > 0.0 && (value - at(name, "value")).abs() < 4.0 * sigma, "{name}: {orbit}");
         }
     }

@@ -153,7 +153,7 @@ fn options_that_make_no_sense_are_refused_by_name() {
     says(&desk.refusal(&["periodogram", "config.json", "--out", "x"]), &["config.json: observations", "three"]);
 }
 
-/// A target that no map without the planet reaches is no reason to give up: the planet may be what is missing.
+/// A target that no map without the planet reaches is not fatal: the planet may explain the misfit.
 #[test]
 fn a_massive_planet_is_found_in_spite_of_the_target() {
     let mut desk = demo();
@@ -166,7 +166,7 @@ fn a_massive_planet_is_found_in_spite_of_the_target() {
     assert!(off.abs() < 4.0, "{off} sigma");
 }
 
-/// A simulated star that changes, made by another program (`tests/data/evolving`).
+/// A simulated star with evolving spots, made by another program (`tests/data/evolving`).
 fn changing(objective: Value) -> Desk {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/evolving/slow-planet");
     let mut config: Value = serde_json::from_slice(&std::fs::read(folder.join("config.json")).unwrap()).unwrap();

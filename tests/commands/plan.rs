@@ -104,7 +104,7 @@ fn a_forecast_is_what_a_search_achieves() {
     assert!((ratio - 1.0).abs() < 0.15, "{ratio}");
 }
 
-/// What there is before the next nights is what a search of the profiles says; then it falls.
+/// The uncertainty before the next nights is that of a search of the profiles; then it falls.
 #[test]
 fn the_next_nights_add_to_what_has_been_observed() {
     let mut config = config(6);
@@ -127,8 +127,8 @@ fn the_next_nights_add_to_what_has_been_observed() {
     assert!(number(&span[1]) > 11.0 && number(&span[1]) < 13.0, "from the day after the last profile on: {span:?}");
 }
 
-/// Nights are chosen for one planet or to tell two periods apart: each adds, and together they say more than as many
-/// others.
+/// Nights are chosen for one planet or to distinguish two periods: each adds, and together they constrain more than as
+/// many others.
 #[test]
 fn the_best_of_the_coming_nights_are_chosen() {
     let mut config = config(6);
@@ -156,12 +156,12 @@ fn the_best_of_the_coming_nights_are_chosen() {
 
     let (said, alias) = chosen(&["--period-d", "4.9", "--alias-d", "1.26"], "c");
     says(&said, &["to tell a planet of 4.9 d from one of 1.26 d"]);
-    // what another period takes up is lost
+    // the part absorbed by another period is lost
     assert!(sigma(alias["chosen"].as_array().unwrap().last().unwrap()) > falls[4]);
     says(&desk.refusal(&["plan", "config.json", "--next", "4", "--out", "d"]), &["planet", "--period-d"]);
 }
 
-/// Two spectrographs and a light curve: before the first night, and then from what has been taken.
+/// Two spectrographs and a light curve: before the first night, and then from existing observations.
 fn two_sets() -> Value {
     let mut config = config(5);
     let mut second = config["observations"].clone();
@@ -242,7 +242,7 @@ fn two_spectrographs_and_a_light_curve_are_planned() {
     says(&desk.refusal(&["plan", "config.json", "--out", "a"]), &["photometry: its times", "one time system"]);
 }
 
-/// From a place nights are as long as the star is up, and a star that is not is refused.
+/// For a given site nights are as long as the star is up, and a star that is never up is refused.
 #[test]
 fn a_place_says_when_a_star_is_up() {
     let site = json!({

@@ -1,4 +1,4 @@
-//! `plot` as users run it: every folder gives its figures, and what is injected is drawn where it is.
+//! `plot` as users run it: every folder gives its figures, and injected values are drawn at their place.
 
 use crate::desk::{Desk, says, two_spots};
 use crate::shared;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
 
-/// A star that does not change, for what is drawn of one map, and for chains of K and phase that tests write.
+/// A star with static spots, for figures of one map, and for chains of K and phase that tests write.
 fn unchanging() -> Value {
     let mut config = two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 30, "ess": 100, "rhat": 1.1 }));
     config["observations"]["simulate"]["spots"][1] = json!([250, 10, 15, 0.9]);
@@ -43,7 +43,7 @@ fn every_folder_has_its_figures() {
             let starts = if file.ends_with("png") { &b"\x89PNG"[..] } else { b"<svg" };
             assert!(bytes.starts_with(starts), "{folder}: {file}");
         }
-        // every figure says what it shows, in names that a reader knows
+        // every figure describes its content, in names that a reader knows
         for figure in figures {
             let svg = desk.read(&format!("{folder}/figures/{figure}.svg"));
             assert!(svg.contains("<title>") && !svg.contains("NaN") && !svg.contains("_kms"), "{folder}: {figure}");
@@ -85,7 +85,7 @@ fn every_folder_has_its_figures() {
 
     figures_say_what_the_files_do(&desk);
 
-    // over the landscape, the chain
+    // over the likelihood grid, the chain
     desk.succeed(&["plot", "grid", "--with", "sample", "--out", "with"]);
     let (with, without) = (desk.read("with/landscape.svg"), desk.read("grid/figures/landscape.svg"));
     assert!(paths(&without, "chain").is_empty() && paths(&with, "chain").len() >= 2);
@@ -102,7 +102,7 @@ fn every_folder_has_its_figures() {
     }
 }
 
-/// The figures of the shared star, held against the files that they are of.
+/// The figures of the shared star, compared with their files.
 fn figures_say_what_the_files_do(desk: &Desk) {
     let near = |a: f64, b: f64| (a - b).abs() < 0.03;
     // the highest place of a smooth curve is the highest peak, whose period is written beside it; the day is marked
@@ -123,7 +123,7 @@ fn figures_say_what_the_files_do(desk: &Desk) {
     let error = (high - low) * (sigma_d / period_d) / (range("max_period_d") / range("min_period_d")).ln();
     let apart = (top[0] - marker[0]).abs();
     assert!(apart < 0.5 * error && near(top[1], marker[1]), "{top:?} {marker:?} {error}");
-    // what the program does not judge by is not drawn; what it judges by is said
+    // only thresholds that the program uses are drawn, and they are labelled
     let svg = desk.read("sample/figures/autocorrelation.svg");
     assert!(!texts(&svg).contains(&"steps/50"));
     let said = if desk.json("sample/summary.json")["converged"] == true { "converged" } else { "not converged" };
@@ -139,7 +139,7 @@ fn figures_say_what_the_files_do(desk: &Desk) {
     let svg = desk.read("map/figures/rv.svg");
     let (zero, frames) = (middle(&paths(&svg, "zero")[0]), paths(&svg, "frame"));
     assert!(frames.iter().any(|frame| near(middle(frame)[1], zero[1])), "{zero:?}");
-    // the landscape's own contours lie under all lines, and no line hides them
+    // the contours of the likelihood grid lie under all lines, and no line hides them
     let svg = desk.read("grid/figures/landscape.svg");
     let place = |class: &str| svg.find(&format!("<path class=\"{class}\""));
     assert!(svg.rfind("<path class=\"contour\"") < place("paraboloid") && place("paraboloid") < place("truth-point"));
@@ -157,7 +157,7 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
     let free = json!({ "k_kms": { "prior": "uniform", "min": 0.0, "max": 2.0 }, "phi": { "prior": "periodic" },
                        "porb_over_prot": { "prior": "log-uniform", "min": 0.4, "max": 9.0 } });
     desk.set("/parameters", free);
-    // whether it converges is all the same
+    // convergence is irrelevant here
     crate::desk::dimcmc(&["sample", CONFIG, "--out", "run"], &desk.path(""));
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut text = String::new();
@@ -199,7 +199,7 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
     };
     let (first, second) = (centre("10") - centre("5"), centre("20") - centre("10"));
     assert!((first - second).abs() < 1.0, "{first} {second}");
-    // no number touches another
+    // numbers do not overlap
     let mut ends: Vec<[f64; 2]> = numbers.iter().map(|one| one.x).collect();
     ends.sort_by(|a, b| a[0].total_cmp(&b[0]));
     assert!(ends.windows(2).all(|pair| pair[0][1] + 2.0 < pair[1][0]), "{ends:?}");
@@ -245,7 +245,7 @@ fn what_cannot_be_drawn_is_refused() {
     desk.refusal(&["plot", "map", "--out", "out"]);
     desk.succeed(&["plot", "map", "--out", "out", "--force"]);
     assert_eq!(desk.read("out/mine.txt"), "precious");
-    // a run that has only begun has figures all the same
+    // a run that has only begun has figures nevertheless
     std::fs::remove_file(desk.path("sample/summary.json")).unwrap();
     let lines: Vec<String> = desk.read("sample/chain.jsonl").lines().map(|line| format!("{line}\n")).collect();
     for steps in [1, 2, 5] {

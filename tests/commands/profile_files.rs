@@ -1,5 +1,5 @@
-//! Profiles as other programs write them, brought to `dimcmc init`: what can be read is, and a refusal says what the
-//! profiles are and what to do. It names no file that has not been written. The formats are in `tests/method/lsd.rs`.
+//! Profiles in the formats of other programs, given to `dimcmc init`: readable ones are read, and a refusal describes
+//! the profiles with advice. It names no file that has not been written. The formats are in `tests/method/lsd.rs`.
 //!
 //! No rotation period is given, so that no map is tried.
 

@@ -1,11 +1,11 @@
-//! What of the star itself is fitted before maps and searches: active regions, line and vsini; and drifts.
+//! Parameters of the star fitted before maps and searches: active regions, line and vsini; and drifts.
 
 use super::desk::{Desk, program, says, two_spots};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
 
-/// A star with spots whose regions have a line of their own, or the photosphere's; to be simulated into `data`.
+/// A star with spots whose regions have a different line, or that of the photosphere; to be simulated into `data`.
 fn star(regions: &Value) -> Value {
     let mut config = two_spots(json!({ "ensembles": 2, "walkers": 10, "steps": 2, "seed": 3, "ess": 1e6 }));
     config["star"]["regions"] = regions.clone();
@@ -50,8 +50,8 @@ fn regions_are_found_where_they_are_and_nowhere_else() {
     }
 }
 
-/// A second command takes what the first has fitted, to the same bytes; what is damaged or of other profiles is fitted
-/// again, and nothing is kept where nothing is to be.
+/// A second command uses the fit of the first, with identical bytes; damaged fits and those of other profiles are
+/// repeated, and nothing is stored where this is disabled.
 #[test]
 fn what_is_fitted_is_kept_for_the_next_command() {
     let (desk, config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
@@ -68,7 +68,7 @@ fn what_is_fitted_is_kept_for_the_next_command() {
     assert_eq!(map("cache", "first"), by_itself);
     let [file] = &kept()[..] else { panic!("{:?}", kept()) };
     assert_eq!(map("cache", "second"), by_itself);
-    // another gain is told as it stands there
+    // another gain is reported as stored
     let whole = std::fs::read_to_string(file).unwrap();
     let mut measured: Value = serde_json::from_str(&whole).unwrap();
     measured["star"]["gain"] = json!(3.25);
@@ -84,7 +84,7 @@ fn what_is_fitted_is_kept_for_the_next_command() {
     assert_eq!(kept().len(), 2);
 }
 
-/// The line and vsini that a config has wrong are put right, and a chain goes on with them as if it had not stopped.
+/// Wrong line and vsini of a config are corrected, and a resumed chain uses them like an uninterrupted one.
 #[test]
 fn a_star_that_is_fitted_is_that_of_a_chain_that_goes_on() {
     let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
@@ -133,7 +133,7 @@ fn keys_that_make_no_sense_are_refused() {
     refused(json!("fitted"), "spottedness", "observations.events: no effect but with imaging.objective");
 }
 
-/// A drift is told with its error, and is no planet at the edge of the search.
+/// A drift is reported with its uncertainty, and is not a planet at the edge of the search.
 #[test]
 fn a_drift_is_told_with_its_error() {
     let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
@@ -141,7 +141,7 @@ fn a_drift_is_told_with_its_error() {
     config["sampler"]["walkers"] = json!(12);
     config["parameters"]["vsys_kms"] = json!({ "prior": "uniform", "min": -1, "max": 1 });
     desk.write(CONFIG, &config.to_string());
-    // 20 m/s a day, as the list of profiles subtracts it
+    // 20 m/s per day, as the list of profiles subtracts it
     let list = desk.read("data/observations.txt");
     let drifted = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
         [file, time] if !line.starts_with('#') => {
@@ -157,8 +157,8 @@ fn a_drift_is_told_with_its_error() {
     assert!((slope - 0.02).abs() < 3.0 * sigma && sigma < 0.005, "{drift}");
 }
 
-/// Two profiles with a weaker line and a bump are found and named, all others keep their errors, and a list by hand
-/// has the last word.
+/// Two profiles with a weaker line and a bump are found and named, all others keep their uncertainties, and a list by
+/// hand takes precedence.
 #[test]
 fn flares_are_found_and_no_others() {
     let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));

@@ -1,4 +1,4 @@
-//! `report` as users run it: one page that needs nothing else, and that a browser shows on a desk and on a phone.
+//! `report` as users run it: one self-contained page, for browsers on desktops and phones.
 
 use crate::desk::{Desk, says, text, two_spots};
 use crate::shared;
@@ -46,7 +46,7 @@ fn a_run_has_a_page() {
     desk.succeed(&["report", "sample", "--force"]);
     assert!(page == desk.read("sample/report.html"));
     desk.refusal(&["report", "absent"]);
-    // a chain that has not converged says so
+    // a chain that has not converged is reported as such
     let mut manifest = desk.json("sample/manifest.json");
     manifest["config"]["sampler"]["ess"] = json!(1_000_000);
     desk.write("sample/manifest.json", &manifest.to_string());
@@ -116,7 +116,7 @@ fn every_folder_has_a_page_that_a_browser_shows() {
     }
 }
 
-/// Warnings stand before tables, and no column of a table is empty.
+/// Warnings come before tables, and no column of a table is empty.
 fn told_in_order(folder: &str, page: &str) {
     let table = page.find("<table").unwrap_or(page.len());
     assert!(page.find("class=\"warnings\"").is_none_or(|warnings| warnings < table), "{folder}");
@@ -149,14 +149,14 @@ fn folders_of_one_star_make_one_page() {
         assert_eq!(page.matches(&format!("<a href=\"#{id}\">")).count().min(1), 1, "{id}");
         assert_eq!(page.matches(&format!("id=\"{id}\"")).count(), 1, "{id}");
     }
-    // what all folders say is said once
+    // what all folders have in common is reported once
     for file in ["periodogram/periodogram.json", "optimise/optimum.json", "sample/summary.json"] {
         let json = desk.json(file);
         let sentence = json.pointer("/verdict/sentence").or_else(|| json.pointer("/blind_search/verdict/sentence"));
         let begin: String = sentence.unwrap().as_str().unwrap().chars().take(30).collect();
         assert_eq!(page.matches(&format!("\">{begin}")).count(), 1, "{file}: {begin}");
     }
-    // how the sampler did is folded away, and so are the velocities of the map
+    // statistics of the sampler are folded, and so are the velocities of the map
     let folded: String = page.split("<details>").skip(1).map(|rest| rest.split("</details>").next().unwrap()).collect();
     for part in ["Sampler diagnostics", "R-hat</th>", "Traces of", "integrated autocorrelation", "assumed orbit"] {
         assert!(folded.contains(part), "{part}");

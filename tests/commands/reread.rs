@@ -5,7 +5,7 @@ use crate::desk::{Desk, dimcmc, says, text, tiny, with_line};
 use crate::shared;
 use serde_json::{Value, json};
 
-/// `value` with what stands at `pointer` replaced.
+/// `value` with the element at `pointer` replaced.
 fn with(value: &Value, pointer: &str, new: Value) -> Value {
     let mut value = value.clone();
     *value.pointer_mut(pointer).unwrap_or_else(|| panic!("{pointer}")) = new;
@@ -222,7 +222,7 @@ fn a_data_set_may_be_one_profile_however_it_comes_about() {
     let (desk, config) = campaign();
     desk.edit("data/red/observations.txt", |list| list.lines().take(2).map(|line| format!("{line}\n")).collect());
     says(&desk.succeed(&["map", "star.json", "--out", "listed"]), &["red: 1 profiles"]);
-    // a star of one profile is none
+    // one profile is not enough for a star
     let single = json!({ "path": "data/red/observations.txt" });
     desk.write("star.json", &with(&config, "/observations", single).to_string());
     says(&desk.refusal(&["map", "star.json", "--out", "x"]), &["the only profile of the list"]);

@@ -1,5 +1,5 @@
-//! `sample` and what belongs to it, as users run them: the same bytes whatever happens on the way, and refusals that
-//! write nothing.
+//! `sample` and related commands as users run them: the same bytes whatever happens meanwhile, and refusals that write
+//! nothing.
 
 #[cfg(unix)]
 use crate::desk::interrupt;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::process::Child;
 use std::time::Duration;
 
-/// Step limit of the tiny run; its goals are out of reach, so that it gets there.
+/// Step limit of the tiny run; its goals are unattainable, so that it reaches the limit.
 const STEPS: usize = 60;
 
 /// Lines of a step: two ensembles of six walkers.

@@ -1,5 +1,5 @@
-//! A star whose spots come and go, and what the commands write of it: made once by the program as it is built, kept on
-//! disk, and copied for each test that looks at results.
+//! A star with evolving spots, and the output of all commands for it: made once per build of the program, stored on
+//! disk, and copied for each test that reads results.
 
 use crate::desk::{Desk, PROGRAM, copy, two_spots};
 use serde_json::{Value, json};
@@ -30,7 +30,7 @@ pub fn config() -> Value {
     config
 }
 
-/// A desk with the config and with what each command writes in a folder of its name: `simulate`, `map`, `optimise`,
+/// A desk with the config and the output of each command in a folder of its name: `simulate`, `map`, `optimise`,
 /// `grid`, `sample`, `periodogram` and `compare`; and a chain by another seed in `seed_4`.
 pub fn desk() -> Desk {
     static MADE: OnceLock<PathBuf> = OnceLock::new();
@@ -64,7 +64,7 @@ fn kept() -> PathBuf {
     desk.succeed(&["sample", CONFIG, "--out", "seed_4", "--seed", "4"]);
     desk.succeed(&["periodogram", CONFIG, "--out", "periodogram", "--draws", "1000"]);
     desk.succeed(&["compare", "sample", "grid", "--out", "compare"]);
-    // whole or not at all; where another process was quicker, its own is the same
+    // complete or not at all; if another process was faster, its result is the same
     let part = tempfile::tempdir_in(&all).unwrap().keep();
     copy(&desk.path(""), &part);
     if std::fs::rename(&part, &folder).is_err() {

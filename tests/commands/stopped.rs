@@ -1,6 +1,6 @@
-//! Whatever stops what takes long (a kill, Ctrl-C, a scheduler's warning, a power cut within a line), the same command
-//! with `--resume` comes to the bytes of one that was not stopped. What a cut leaves byte by byte is in
-//! `tests/method/chain.rs`, ranks of a cluster in `tests/mpi.rs`.
+//! Whatever interrupts a long computation (a kill, Ctrl-C, a scheduler's warning, a power cut within a line), the same
+//! command with `--resume` gives the bytes of an uninterrupted one. Cuts byte by byte are in `tests/method/chain.rs`,
+//! ranks of a cluster in `tests/mpi.rs`.
 #![cfg(unix)]
 
 use crate::desk::{Desk, kill, says, text, tiny};
@@ -11,11 +11,11 @@ use std::time::Duration;
 
 const CONFIG: &str = "config.json";
 
-/// Something that takes long, by one thread.
+/// A long computation, with one thread.
 struct Task {
     command: &'static str,
     config: Value,
-    /// What its folder holds at the end: what it was begun with, lines of results, and what follows from all of them.
+    /// The final content of its folder: its settings, lines of results, and the summary.
     files: [&'static str; 3],
     /// Lines that are written at once.
     block: usize,
@@ -40,7 +40,7 @@ fn tasks() -> [Task; 2] {
     ]
 }
 
-/// A chain with all maps integrated over.
+/// A chain under the marginal likelihood.
 fn integrated() -> Task {
     let block = shared::ENSEMBLES * shared::WALKERS;
     let mut config = shared::config();
@@ -65,7 +65,7 @@ impl Task {
     }
 
     fn resumed_is_whole(&self, desk: &Desk, out: &str) {
-        // one that was stopped before it was said what it began with begins again
+        // one that was stopped before its settings were written begins again
         let begun = desk.path(out).join(self.files[0]).exists();
         desk.succeed(&[&self.args(out)[..], &[if begun { "--resume" } else { "--force" }]].concat());
         for file in self.files {

@@ -1,5 +1,5 @@
-//! Whether every command tells the same story of a star, on seeds of two stars whose spots live 20 d, one with a planet
-//! and one without, and of one that two spectrographs observe. By hand; the tables of `results/newcomer.md` are theirs:
+//! Consistency of all commands, on seeds of two stars with spot lifetimes of 20 d, one with a planet and one without,
+//! and of one that two spectrographs observe. By hand; the tables of `results/newcomer.md` are theirs:
 //!
 //!     cargo test --release --test commands story -- --ignored --nocapture --test-threads 1
 //!
@@ -42,7 +42,7 @@ fn configured(desk: &Desk, rotation_period_d: f64, name: &str) -> std::process::
     dimcmc(&[&["init", "data/observations.txt"][..], &given].concat(), &desk.path("."))
 }
 
-/// Runs a command that may say what it costs.
+/// Runs a command that may print its cost.
 fn run(desk: &Desk, args: &[&str]) {
     let done = dimcmc(args, &desk.path("."));
     assert!(done.status.success(), "{args:?}: {}", text(&done.stderr));
@@ -52,7 +52,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// What one star was told by all commands; the row of the table, and what disagrees.
+/// The results of all commands for one star; the row of the table, and disagreements.
 fn told(star: &str, seed: u64) -> (String, Vec<String>) {
     let desk = simulated(star, seed);
     assert!(configured(&desk, PROT_D, "star.json").status.success());
@@ -136,8 +136,8 @@ fn by_hand_every_command_agrees() {
     assert!(apart.is_empty());
 }
 
-/// A quarter of an hour: the offset between two spectrographs, by the config that `init` writes of both and a light
-/// curve, is known as well as it says.
+/// A quarter of an hour: the offset between two spectrographs, by the config that `init` writes for both and a light
+/// curve, has a calibrated uncertainty.
 #[test]
 #[ignore = "by hand: a quarter of an hour"]
 fn by_hand_offsets_between_spectrographs() {
@@ -180,7 +180,7 @@ fn by_hand_offsets_between_spectrographs() {
     assert!(missed.len() <= 1, "{missed:?}");
 }
 
-/// A quarter of an hour: rotation periods that are off are named, and no planet is claimed with them.
+/// A quarter of an hour: wrong rotation periods are reported, and no planet is claimed with them.
 #[test]
 #[ignore = "by hand: a quarter of an hour"]
 fn by_hand_wrong_rotation_periods() {

@@ -121,7 +121,7 @@ fn results_of_the_program_are_read() {
     says(&figures, &["completeness.svg", "rates.png"]);
 }
 
-/// All that is in the box is found, and there are no false alarms in it: a binomial.
+/// All planets in the box are detected, and there are no spurious ones: a binomial.
 #[test]
 fn rates_are_those_of_closed_forms() {
     let desk = sample(&[QUIET; 30]);
@@ -235,7 +235,7 @@ fn groups_and_reliabilities_come_from_a_table() {
     says(&refused(&["--table", "stars.csv", "--reliability", "planet"]), &["stars.csv:2: planet: \"2\" is no prob"]);
 }
 
-/// Neither a star without a verdict nor one whose planet was known before says anything of the rate.
+/// Neither a star without a verdict nor one whose planet was known before constrains the rate.
 #[test]
 fn stars_without_a_blind_verdict_do_not_count() {
     let desk = sample(&[QUIET; 3]);

@@ -1,5 +1,5 @@
-//! Results are there whole or not at all, whatever ends a command: signals, full disks, kills; what these leave is no
-//! obstacle, and of two commands for one folder one is refused before it has worked.
+//! Results are complete or absent, whatever ends a command: signals, full disks, kills; leftovers are no obstacle, and
+//! of two commands for one folder one is refused before it starts its work.
 
 use crate::desk::{Desk, dimcmc, says, text, tiny};
 #[cfg(target_os = "linux")]

@@ -1,4 +1,4 @@
-//! Velocity zero points: what they make of the information, how they are found, and what is said of them.
+//! RV jitter: its effect on the information, its measurement, and its report.
 
 use crate::desk::{Desk, dimcmc, says, star, text};
 use dimcmc::internals::data::config::Config;
@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// A zero point and the velocity of a profile enter alike, so that the covariance of the velocities is that without
-/// zero points plus their variance: here on the demo's star, as orbits see it, and every profile by itself.
+/// An RV offset and the velocity of a profile enter alike, so that the covariance of the velocities is that without
+/// jitter plus its variance: here on the demo's star, projected on orbits, and for every profile by itself.
 #[test]
 fn zero_points_add_their_variance_to_that_of_the_velocities() {
     const SD_KMS: f64 = 0.1;
@@ -141,7 +141,7 @@ fn zero_points_are_no_planet_and_a_planet_is_no_zero_point() {
     assert_eq!(found["measured"]["velocity_jitter"]["beside_orbit"]["counts"], true);
 }
 
-/// What makes no sense is refused by key, and a run does not go on with other zero points.
+/// Invalid values are refused by key, and a run is not resumed with another RV jitter.
 #[test]
 fn the_key_is_checked() {
     let desk = Desk::new(crate::desk::tiny(2));

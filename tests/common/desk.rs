@@ -1,4 +1,4 @@
-//! The program as users run it, in a folder of its own.
+//! The program as users run it, in a separate folder.
 #![allow(dead_code)]
 
 use serde_json::{Value, json};
@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// A folder of its own with a config.
+/// A separate folder with a config.
 pub struct Desk {
     folder: tempfile::TempDir,
     pub config: Value,
 }
 
-/// A small star, its local line and all.
+/// A small star, including its local line.
 pub fn star() -> Value {
     json!({
         "rotation_period_d": 3.0, "inclination_deg": 50.0, "vsini_kms": 20.0, "contrast": 0.1,
@@ -40,7 +40,7 @@ pub fn two_spots(sampler: Value) -> Value {
     })
 }
 
-/// The same star in more noise, for chains of two ensembles of six walkers that go on to so many steps.
+/// The same star in more noise, for chains of two ensembles of six walkers and this many steps.
 pub fn tiny(steps: usize) -> Value {
     let mut config = two_spots(json!({ "ensembles": 2, "walkers": 6, "steps": steps, "seed": 3, "ess": 1e6 }));
     config["planet"]["phi"] = json!(0.5);
@@ -65,10 +65,10 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Where it keeps what it fits to profiles, for the next test.
+/// Folder of its cached fits to profiles, for the next test.
 pub const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/fitted");
 
-/// The program, ready to be told what to do.
+/// The program, ready for arguments.
 pub fn program() -> Command {
     let mut command = Command::new(PROGRAM);
     command.env("DIMCMC_CACHE", CACHE);
@@ -219,13 +219,13 @@ impl Desk {
     }
 }
 
-/// Ends a program as a power cut does.
+/// Ends a program like a power cut.
 pub fn kill(mut child: Child) {
     child.kill().unwrap();
     child.wait().unwrap();
 }
 
-/// Ends a program as Ctrl-C does; what it says.
+/// Ends a program as Ctrl-C does; its message.
 #[cfg(unix)]
 pub fn interrupt(child: Child) -> String {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
@@ -234,7 +234,7 @@ pub fn interrupt(child: Child) -> String {
     text(&output.stderr)
 }
 
-/// Whether every part stands in the message.
+/// Whether every part occurs in the message.
 pub fn says(message: &str, parts: &[&str]) {
     println!("{message}");
     for part in parts {

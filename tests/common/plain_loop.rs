@@ -1,8 +1,8 @@
-//! The yardstick of the response: the obvious loop over visible (pixel, profile) pairs, each of which holds the local
-//! line in a window of velocity bins around its own velocity.
+//! The reference of the response: a plain loop over visible (pixel, profile) pairs, each of which has the local line in
+//! a window of velocity bins around its own velocity.
 //!
-//! Written from the formulas of `docs/method.md` section 1 and the public table of pixel centres alone, so that it
-//! shares nothing with what it is held against.
+//! Written from the formulas of `docs/method.md` section 1 and the public table of pixel centres alone, so that it is
+//! independent of the code that it is compared with.
 #![allow(dead_code)]
 
 use dimcmc::internals::star::{Sampling, StarSettings, StarState, SurfaceGrid};

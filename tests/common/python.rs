@@ -1,5 +1,5 @@
-//! A Python of its own for tests that open results with other programs: a virtual environment under `target/python`,
-//! made once.
+//! A separate Python for tests that open results with other programs: a virtual environment under `target/python`, made
+//! once.
 #![allow(dead_code)]
 
 use std::fs::File;
@@ -10,8 +10,8 @@ use std::process::{Command, Output};
 /// What is installed, in whatever version there is today: users have no other.
 const PACKAGES: &str = include_str!("packages.txt");
 
-/// The interpreter, or `None`, said aloud, where it cannot be had. In continuous integration (`CI` is set) it must be
-/// had.
+/// The interpreter, or `None` with a message where it is unavailable. In continuous integration (`CI` is set) it is
+/// required.
 pub fn python() -> Option<PathBuf> {
     let found = environment();
     if let Err(problem) = &found {

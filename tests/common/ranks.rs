@@ -1,4 +1,4 @@
-//! What this program does as a rank of a job: go wrong on purpose, or be asked and measured.
+//! This program as a rank of a job: fails on purpose, or is queried and timed.
 
 use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
 use std::convert::Infallible;

@@ -155,7 +155,7 @@ fn hold(faults: Vec<String>) {
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
 
-/// Whoever comes new to the tree sees a dozen names.
+/// A newcomer to the tree sees a dozen names.
 #[test]
 fn every_room_is_listed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -221,8 +221,7 @@ fn all_but_the_command_line_are_silent() {
     hold(faults);
 }
 
-/// What is found by a cell's own `get_or_init` holds the cell meanwhile: jobs within it that ask for it wait for
-/// themselves.
+/// `get_or_init` of a cell locks the cell meanwhile: jobs within it that need its value wait for themselves.
 #[test]
 fn what_is_found_once_holds_no_cell() {
     let mut faults = Vec::new();

@@ -546,7 +546,7 @@ fn no_text_makes_it_panic() {
     }
 }
 
-/// Puts `piece` in place of the first number after `at`: texts that are still JSON, and reach the checks of the values.
+/// Replaces the first number after `at` by `piece`: texts that are still JSON, and reach the checks of the values.
 fn replace_number(base: &[u8], at: usize, piece: &[u8]) -> Vec<u8> {
     let part_of_number = |b: &u8| b.is_ascii_digit() || b"-.".contains(b);
     let starts = |k: &usize| b":,[".contains(&base[*k]) && base.get(k + 1).is_some_and(part_of_number);

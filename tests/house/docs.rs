@@ -1,8 +1,8 @@
 //! README and `docs/`: what they say is what the program does.
 //!
-//! Blocks marked `sh` are run line by line, in the order of the page, in a folder of its own with a small star; of
-//! blocks marked `console`, which need what a test does not have, commands and options are looked up. Blocks marked
-//! `json` are configs.
+//! Blocks marked `sh` are run line by line, in the order of the page, in a separate folder with a small star; of blocks
+//! marked `console`, which need what a test does not have, commands and options are looked up. Blocks marked `json` are
+//! configs.
 
 use crate::desk::{Desk, copy};
 use crate::reference;
@@ -157,7 +157,7 @@ fn lines_are_short() {
     }
     for page in pages() {
         for (number, block, line) in page.lines() {
-            // tables, links and what the program prints are as long as they are
+            // tables, links and output of the program may be longer
             let free = block == Some("text") || line.starts_with('|') || line.contains("](");
             if !free && line.chars().count() > LONGEST_LINE {
                 faults.push(format!("{}:{number}: {} characters", page.path.display(), line.chars().count()));
@@ -354,8 +354,8 @@ fn star() -> Desk {
     desk
 }
 
-/// In place of what `init` wrote: a coarse map, spots of which nothing is to be found, no scatter of zero points or
-/// systemic velocity, and a short chain, which take a tenth of the time.
+/// In place of the config of `init`: a coarse map, fixed hyperparameters of spots, no RV jitter or free systemic
+/// velocity, and a short chain, which take a tenth of the time.
 fn shorten(desk: &Desk) {
     let mut config = desk.json("star.json");
     config["imaging"]["pixels"] = json!(300);

@@ -119,7 +119,7 @@ fn every_command_has_its_page() {
 fn the_version_is_that_of_the_package() {
     let version = help(&["--version"]);
     let rest = version.strip_prefix(concat!("dimcmc ", env!("CARGO_PKG_VERSION"))).expect(&version).trim_end();
-    // the commit, where the program was built in a working tree of its own
+    // the commit, where the program was built in a separate working tree
     let commit = rest.strip_prefix(" (").and_then(|rest| rest.strip_suffix(')'));
     assert!(
         rest.is_empty() || commit.is_some_and(|c| c.len() >= 7 && c.chars().all(|c| c.is_ascii_hexdigit())),

@@ -1,4 +1,4 @@
-//! What holds the house together: the source tree, configs, examples and documents.
+//! Consistency of the source tree, configs, examples and documents.
 
 #[path = "../common/desk.rs"]
 mod desk;

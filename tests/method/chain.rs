@@ -246,7 +246,7 @@ fn a_displaced_ensemble_and_a_stuck_walker_are_not_converged() {
         "{last}"
     );
 
-    // of several parameters one number of steps, that of the worst
+    // one number of steps for several parameters, that of the worst
     let slow = chain(&["a", "b", "c"], [4, 8, 400], &mut |rng, [ensemble, ..]| {
         vec![ensemble as f64 + normal(rng), 0.5 * ensemble as f64 + normal(rng), normal(rng)]
     });

@@ -1,4 +1,5 @@
-//! Several data sets of one star: each is seen as if it were alone, and zero points between them do not become spots.
+//! Several data sets of one star: each is modelled as if it were alone, and RV offsets between them do not become
+//! spots.
 
 use dimcmc::NoMaps;
 use dimcmc::internals::maxent::Problem;
@@ -14,7 +15,7 @@ use serde_json::{Value, json};
 
 const OFFSET_KMS: f64 = 0.3;
 
-/// Two spectrographs in two seasons, of which the second is farther to the red.
+/// Two spectrographs in two seasons, the second with an RV offset to the red.
 fn config() -> Value {
     json!({
         "star": { "rotation_period_d": 3.0, "inclination_deg": 60.0, "vsini_kms": 25.0,
@@ -39,7 +40,7 @@ fn scene(config: &Value) -> Scene {
     Scene::new(&Config::from_json(&config.to_string()).unwrap()).unwrap()
 }
 
-/// The star as one set sees it.
+/// The star for one set.
 fn alone(s: usize) -> Scene {
     let mut one = config();
     let mut set = one["observations"][s].clone();
@@ -61,7 +62,7 @@ fn each_set_is_seen_as_if_it_were_alone() {
     let apart: Vec<f64> = parts.iter().flat_map(|one| one.imager.response(&state).depths(&map)).collect();
     assert_eq!(together, apart);
     assert!(parts[0].imager.star.contrast < parts[1].imager.star.contrast, "spots fade to the red");
-    // a response near by, and one that is shifted, are those of the sets too
+    // a response near by, and one that is shifted, are those of the sets as well
     let nearby = both.imager.nearby(&state);
     let response = both.imager.response_near(&nearby, &state);
     let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
@@ -93,8 +94,8 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     known["imaging"]["objective"] = json!("spottedness");
     let both = scene(&known);
     assert_eq!(both.imager.maps(), 2);
-    // so much entropy for chi2, whether that of the mean map or of one of the two: the season with more data has as
-    // much as alone, the other less
+    // one exchange rate of entropy and chi2 for the mean map and each of the two: the season with more data has as much
+    // as alone, the other less
     const LAMBDA: f64 = 1.0;
     let image = |imager: &Imager, lambda: f64| {
         let reference = Reference::at_lambda(imager, both.settings.values, lambda).unwrap();
@@ -109,7 +110,7 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     let off = together.iter().zip(&apart).fold(0.0, |off: f64, (a, b)| off.max((a - b).abs()));
     assert!(together.len() == apart.len() && off < 1e-3, "{off}");
     assert!(apart.iter().fold(0.0, |most: f64, s| most.max(*s)) > 0.3, "there are spots");
-    // a star that does not change from one to the other fits neither
+    // a static map for both fits neither
     known["imaging"]["season_gap_d"] = json!(1000.0);
     let one = Config::from_json(&known.to_string()).unwrap();
     let error = Scene::new(&one).unwrap().maps(None).unwrap_err();
@@ -143,7 +144,7 @@ fn rotation_turns_the_map_of_a_season_from_its_own_middle() {
     let second = response.bins(8).start;
     let apart = [&alone(epochs[0])[..second], &alone(epochs[1])[second..]].concat();
     assert_eq!(together, apart);
-    // integrated maps have one epoch
+    // evolving maps have one epoch
     assert_eq!(scene(&config()).imager.maps(), 1);
 }
 
@@ -180,18 +181,18 @@ fn a_zero_point_that_is_not_known_is_found_and_held() {
     let HeldZeroPoint { held_kms, found } = both.measured.sets[1].zero_point.expect("a zero point");
     println!("{held_kms}");
     assert!((held_kms - OFFSET_KMS).abs() < 0.2, "{held_kms}");
-    // how well it is known is said by those who fit a model
+    // its uncertainty is reported by commands that fit a model
     assert_eq!(found, None);
     assert!(both.measured.sets[0].zero_point.is_none());
     assert_eq!(both.observations.profiles.len(), 16);
     assert_eq!(both.imager.profiles_of(1), 8..16);
-    // an orbit put in finds the zero point held, and does not look for it again
+    // an injected orbit keeps the fitted RV offset fixed, without a new fit
     let injected = both.injected(&[]).unwrap();
     assert_eq!(injected.measured, both.measured);
     let firsts = |scene: &Scene| scene.imager.profiles().map(|profile| profile.1).collect::<Vec<f64>>();
-    // held in one step rather than in several
+    // fixed in one step rather than in several
     assert!(firsts(&injected).iter().zip(firsts(&both)).all(|(a, b)| (a - b).abs() < 1e-12));
-    // of a night left out, sets and zero points stay in their places
+    // without a night, sets and RV offsets keep their order
     let second = both.imager.without(&(0..8).collect::<Vec<_>>());
     assert_eq!((second.sets.len(), second.zero_points[0].set), (1, 0));
     assert_eq!(both.imager.without(&[3, 9]).sets[0].sampling.profiles.len(), 7);

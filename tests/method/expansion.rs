@@ -90,7 +90,7 @@ fn orbits(oracle: &Oracle, imager: &Imager) {
         let [k, period, phi] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi].map(|p| orbit[p]);
         println!("K {k:.3} P {period:.3} phi {phi:.3}: {full:9.3}, quadratic {quadratic:9.3}");
         let difference = (full - quadratic).abs();
-        // near co-rotation the spots answer by moving, which the entropy of dark and bright pixels makes less than
+        // near co-rotation the spots respond by moving, which the entropy of dark and bright pixels makes less than
         // linear
         let worst = if (period - 1.0).abs() < 0.3 { &mut worst_near } else { &mut worst };
         *worst = worst.max(difference);
@@ -173,7 +173,7 @@ fn posterior_of_the_orbit() {
     }
 }
 
-/// Integrating a parameter out is adding its own scatter to the velocities.
+/// Marginalising over a parameter adds its scatter to the velocities.
 #[test]
 fn marginalised_velocities() {
     let oracle = oracle();
@@ -210,7 +210,7 @@ fn marginalised_velocities() {
     assert!(average.abs() / (expansion.profiles() as f64) < 0.05);
 }
 
-/// The star's own parameters where spots are the photosphere, dimmed.
+/// The star's parameters where spots are merely dimmed photosphere.
 fn of_plain_spots() -> Vec<Parameter> {
     STELLAR.iter().copied().filter(|p| !Parameter::REGIONS.contains(p)).collect()
 }
@@ -222,7 +222,7 @@ fn step_of(p: Parameter) -> f64 {
     }
 }
 
-/// Where the orbit turns with the star, spots imitate it.
+/// Where the orbit is synchronous with the rotation, spots mimic it.
 #[test]
 fn co_rotation_hides_a_planet() {
     let oracle = oracle();
@@ -246,9 +246,9 @@ fn co_rotation_hides_a_planet() {
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
 }
 
-/// Unresolved spots counted in the posterior: the same at the reference; near it ln of the density of the gradient, its
-/// size integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on
-/// where the quadratics would have turned the sum of exact ln L and their difference upwards.
+/// Unresolved spots counted in the posterior: the same at the reference; near it ln of the density of the gradient,
+/// marginalised over its size by an independent sum; ln L falls everywhere, not faster than without them, and continues
+/// to fall where the quadratics would have turned the sum of exact ln L and their difference upwards.
 #[test]
 fn a_posterior_that_counts_unresolved_spots() {
     let oracle = oracle();
@@ -307,8 +307,8 @@ fn a_posterior_that_counts_unresolved_spots() {
     }
 }
 
-/// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference,
-/// as it is next to one that is not its maximum, and the density of the gradient below it.
+/// The part of ln L beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the
+/// reference, which happens next to one that is not its maximum, and the density of the gradient below it.
 #[test]
 fn unresolved_spots_magnify_nothing() {
     let oracle = oracle();

@@ -213,7 +213,7 @@ fn the_key_reaches_model_and_simulation() {
     assert_eq!(with.imager.sets[0].exposures, [Exposure { length_d: 0.05, looks: 5 }; 12]);
     let depths = |scene: &Scene| scene.imager.data.depth.clone();
     assert!(largest(&depths(&with), &depths(&without)) > 1e-3, "{}", largest(&depths(&with), &depths(&without)));
-    // too short to count: the same bytes
+    // too short to matter: the same bytes
     let short = scene(&config("spottedness", Some(20.0))).unwrap();
     assert!(short.imager.sets[0].exposures.is_empty());
     assert_eq!(depths(&short), depths(&without));

@@ -1,7 +1,7 @@
 //! The field's evidence against an independent implementation: `ln_evidence`, `gradient` and `information` of stars
-//! that change (`../shared/oracle/evolving`, where it is).
+//! with evolving spots (`../shared/oracle/evolving`, where it is).
 //!
-//! The star is written here anew and plainly, on the pixels of the reference: rings, a Gaussian line, linear limb
+//! The star is implemented here again and plainly, on the pixels of the reference: rings, a Gaussian line, linear limb
 //! darkening, rigid or sheared rotation, spots that are dark by a contrast; depths of neighbouring bins are averaged
 //! two by two.
 
@@ -143,7 +143,7 @@ impl Star {
     }
 }
 
-/// How the star is seen in one profile.
+/// The view of the star in one profile.
 fn view(config: &Value, profile: &Observed, pixels: &[(f64, f64, f64)], basis: &DMatrix<f64>) -> View {
     let star = &config["star"];
     let inclination = number(star, &["inclination_deg"]).to_radians();
@@ -268,7 +268,7 @@ fn folders(parent: PathBuf) -> Vec<PathBuf> {
     folders
 }
 
-/// The folders of the reference, said aloud where they are missing.
+/// The folders of the reference, with a message where they are missing.
 fn stars() -> Vec<PathBuf> {
     let found = folders(Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/oracle/evolving"));
     if found.is_empty() {

@@ -1,5 +1,5 @@
-//! The field on problems small enough to do otherwise: by integration over a grid, by dense algebra, by differences, in
-//! limits.
+//! The field on problems small enough for other methods: by integration over a grid, by dense algebra, by differences,
+//! in limits.
 
 use dimcmc::internals::field::{
     Compression, Degrees, Epoch, Evidence, Field, FieldError, Kernel, Lifetime, Quadratic, Spectrum,
@@ -68,7 +68,7 @@ impl Problem {
         self.epochs.iter().map(Epoch::len).sum()
     }
 
-    /// A matrix of every epoch (its data, columns), all below each other, each in columns of its own.
+    /// A matrix of every epoch (its data, columns), stacked, each in its own columns.
     fn apart(&self, of: impl Fn(&Epoch) -> DMatrix<f64>) -> DMatrix<f64> {
         let blocks: Vec<DMatrix<f64>> = self.epochs.iter().map(of).collect();
         let mut all = DMatrix::zeros(self.data(), blocks.iter().map(|block| block.ncols()).sum());

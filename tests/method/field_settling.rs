@@ -1,5 +1,5 @@
-//! The field of models that are not linear in it, on problems small enough to do otherwise: where it is found, and what
-//! ln Z is there.
+//! The field of models that are not linear in it, on problems small enough for other methods: its position, and ln Z
+//! there.
 
 use super::field_algebra::{EXACT, Problem, field, some};
 use dimcmc::internals::field::{Degrees, Epoch, FieldError, Lifetime, Settling, Sought, settle};

@@ -1,5 +1,5 @@
-//! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and
-//! every reason to see nothing.
+//! The first look at simulated stars: vsini and centre within the errors that it gives, positions of lines, and every
+//! reason of failure.
 
 use dimcmc::internals::data::simulate::Simulation;
 use dimcmc::internals::model::{Parameter, ParameterValues};
@@ -18,7 +18,7 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
     with_line((LINE.sigma_kms, LINE.limb_darkening), vsini_kms, cap_deg, beyond_kms, rng)
 }
 
-/// The same with a local line of a width, as the spectrograph shows it, and limb darkening of its own.
+/// The same with this width of the local line after the spectrograph, and this limb darkening.
 fn with_line(
     (sigma_kms, limb_darkening): (f64, f64),
     vsini_kms: f64,
@@ -83,7 +83,7 @@ fn vsini_and_centre_are_within_their_errors() {
                 let observed = observe(vsini, cap, 0.3 * vsini + 20.0, &mut rng);
                 assert_eq!(DoubleLines::of(&observed, LINE.sigma_kms), None, "{vsini} km/s, a cap of {cap}");
                 let look = FirstLook::at(&observed, LINE).unwrap();
-                // line and limb darkening are known here: what is left is what spots are said to do
+                // line and limb darkening are known here: the uncertainty is the allowance for spots
                 let by_spots = 0.01 * vsini + 0.3;
                 vsini_pulls.push((look.unspotted.vsini_kms - vsini) / by_spots);
                 centre_pulls.push((look.unspotted.centre_kms - VSYS_KMS) / look.centre_error_kms);
@@ -104,7 +104,8 @@ fn vsini_and_centre_are_within_their_errors() {
     }
 }
 
-/// Nobody says how wide the local line is, 2 to 6 km/s; a spectrograph of R = 65000 adds 1.96 km/s to a guess of 2.5.
+/// The width of the local line, 2 to 6 km/s, is not given; a spectrograph of R = 65000 adds 1.96 km/s to a guess of
+/// 2.5.
 #[test]
 fn an_unknown_line_width_is_in_the_error_of_vsini() {
     const INSTRUMENT_KMS: f64 = 1.96;
@@ -114,7 +115,7 @@ fn an_unknown_line_width_is_in_the_error_of_vsini() {
     let mut pulls = Vec::new();
     let mut look = |vsini: f64, sigma: f64| {
         let cap = if rng.random_bool(0.3) { 25.0 } else { 0.0 };
-        // as well known as it is said to be
+        // its uncertainty is calibrated
         let limb_darkening = 0.65 + rng.random_range(-0.26..0.26);
         let line = (sigma.hypot(INSTRUMENT_KMS), limb_darkening);
         let observed = with_line(line, vsini, cap, 0.3 * vsini + 30.0, &mut rng);

@@ -217,8 +217,7 @@ fn gaussian(x: f64, sigma: f64) -> f64 {
     (-0.5 * (x / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
 }
 
-/// Nothing of the equivalent width is lost but what lies beyond the bins: `(gamma/pi) / v` on either side, to first
-/// order.
+/// Only the part of the equivalent width beyond the bins is lost: `(gamma/pi) / v` on either side, to first order.
 #[test]
 fn voigt_wings_hold_their_share_of_the_equivalent_width() {
     let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
@@ -238,7 +237,7 @@ fn voigt_wings_hold_their_share_of_the_equivalent_width() {
     }
 }
 
-/// A surface that the state gives is that of a star with such settings.
+/// A surface in the state is equivalent to a star with such settings.
 #[test]
 fn surface_parameters_stand_in_place_of_settings() {
     let grid = SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2);
@@ -264,8 +263,8 @@ fn surface_parameters_stand_in_place_of_settings() {
     assert_eq!((response.contrast(0), direct.contrast(0)), (0.3, 0.3));
 }
 
-/// A star with regions of their own line, which are smaller and brighter at the limb, by the formula: a sum over
-/// pixels, on a grid so fine that each is a point.
+/// A star with regions that have a different line, which are smaller and brighter at the limb, by the formula: a sum
+/// over pixels, on a grid so fine that each is a point.
 #[test]
 fn regions_are_as_the_formula_says() {
     let regions = Regions {

@@ -1,4 +1,4 @@
-//! Activity indicators beside profiles: gains by the evidence, rows of the likelihood, and what they tell of spots.
+//! Activity indicators beside profiles: gains by the evidence, rows of the likelihood, and their constraints on spots.
 
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::star::Band;
@@ -45,7 +45,7 @@ fn noise(k: usize, seed: u64) -> f64 {
     (2.0 * (x - x.floor()) - 1.0) * 3f64.sqrt()
 }
 
-/// Values of an indicator that is so many times the filling factor of the visible disc, in noise.
+/// Values of an indicator that is this multiple of the filling factor of the visible disc, in noise.
 fn values(scene: &Scene, count: usize, gain: f64, sigma: f64, seed: u64) -> Vec<Flux> {
     let simulation = scene.settings.sets[0].simulation().unwrap();
     let times_d: Vec<f64> = (0..count).map(|k| 21.0 * (k as f64 + 0.3) / count as f64).collect();
@@ -72,7 +72,7 @@ fn gains_of_either_sign_come_back_and_noise_has_none() {
     let marginal = marginal(&scene, &basis, 12.0);
     let filling = values(&scene, 40, 1.0, 1e-9, 1);
     let (scale, _) = scaled(&filling);
-    // as large as the scatter of the filling factor, a third of it, and in units of a field in gauss
+    // as large as the rms of the filling factor, a third of it, and in units of a field in gauss
     for (gain, sigma) in [(1.0, 0.1 * scale.rms), (-1.0, 0.1 * scale.rms), (-0.5, 0.3 * scale.rms), (4000.0, 10.0)] {
         let found = found(&scene, &marginal, &values(&scene, 40, gain, sigma, 3));
         println!("{gain}: {found:?}");

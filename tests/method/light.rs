@@ -1,4 +1,4 @@
-//! Light curves beside profiles: dense algebra on a small star, and what they tell of spots.
+//! Light curves beside profiles: dense algebra on a small star, and their constraints on spots.
 
 use dimcmc::internals::field::{Compression, Epoch, Evidence, Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::model::Parameter;
@@ -137,7 +137,7 @@ fn a_light_curve_tells_the_lifetime_of_spots() {
     assert!(with < 0.5 * without, "{with} with a light curve, {without} without");
 }
 
-/// Fits of some stars: errors of the lifetime, the rest of the field held, and K in units of its error.
+/// Fits of some stars: errors of the lifetime, the rest of the field fixed, and K in units of its error.
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn light_curves_halve_the_error_of_the_lifetime_and_do_not_bias_k() {

@@ -1,4 +1,4 @@
-//! LSD profiles in and out: the real formats, round trips, and one clear line for everything that can be wrong.
+//! LSD profiles in and out: the real formats, round trips, and one clear line for every error.
 
 use dimcmc::internals::data::io::lsd;
 use dimcmc::internals::star::observation::{Observations, Profile};

@@ -1,4 +1,4 @@
-//! Maps of stars that change: they come back at their times, and tell nothing of other times.
+//! Maps of evolving spots: they are recovered at their times, and unconstrained at other times.
 
 use dimcmc::{Config, NoMaps, Observations, Scene, SurfaceMaps, VelocityWithoutSpots};
 use serde_json::json;
@@ -96,13 +96,13 @@ fn each_night_has_its_own_map_and_far_away_there_is_none() {
         assert!(correlation(own, own) > 0.6, "{own}: {}", correlation(own, own));
         assert!(correlation(own, own) > correlation(own, other) + 0.4, "{own}: {}", correlation(own, other));
     }
-    // a star that does not change fits worse, and one that does within the noise
+    // a static map fits worse, and an evolving one within the noise
     let summary = &fit.summary;
     assert!(summary.chi2_per_datum < 1.1 && summary.chi2_per_datum_unchanging.unwrap() > 1.5, "{summary:?}");
     assert_eq!(fit.model.len(), 16);
     assert_eq!(fit.static_model.as_ref().unwrap().len(), 16);
 
-    // the correlation with all profiles is 0 to rounding: the field before the data, alike everywhere
+    // the correlation with all profiles is 0 to rounding: the prior of the field, uniform everywhere
     let amplitude = fit.field.as_ref().unwrap().spot_amplitude;
     let far = &fit.maps[2];
     assert!(far.pixels.iter().all(|x| (x - 0.06).abs() < 1e-12));
@@ -117,7 +117,7 @@ fn each_night_has_its_own_map_and_far_away_there_is_none() {
 
 #[test]
 fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
-    // a star that does not change, its profiles with zero points of 1 km/s
+    // static spots, with an RV jitter of 1 km/s
     let spots = json!([[40.0, 35.0, 22.0, 0.9]]);
     let jitter_kms = 1.0;
     let whole = config(&spots, &cycles()).with("observations.simulate.velocity_jitter_kms", jitter_kms);
@@ -131,13 +131,13 @@ fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
         (fit, like)
     };
     let (counted, like) = fit(jitter_kms);
-    // of a star that does not change there is one map, and nothing to compare it with
+    // static spots have one map, and nothing to compare it with
     assert_eq!((counted.maps.len(), counted.static_model.is_none()), (1, true));
     assert_eq!(counted.zero_points_kms.len(), 16);
     let (ignored, less_like) = fit(0.0);
     assert!(like > less_like, "{like} {less_like}");
     assert!(counted.summary.chi2_per_datum < ignored.summary.chi2_per_datum);
-    // velocities scatter as zero points do, whose error is theirs; 16 of them say their scatter to 18 %
+    // velocities have the rms of the jitter and its uncertainties; 16 of them constrain the rms to 18 %
     let (rms, error) = (counted.summary.rv_rms_kms.unwrap(), counted.summary.rv_error_kms.unwrap());
     assert!((rms / jitter_kms - 1.0).abs() < 0.45, "{rms}");
     assert!(error > 0.9 * jitter_kms, "{error}");
@@ -175,7 +175,7 @@ fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
         assert_eq!(status(Some(times)), Err(Some("no-such-times")), "{times:?}");
     }
     assert!(matches!(scene.maps(Some(&[])), Err(NoMaps::Times(_))));
-    // of one that is less fast maps are found, and said to be no good
+    // for a slightly faster star maps are found, and reported as bad fits
     let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 32.0).with("observations.simulate.snr", 5000.0);
     let fit = with_profiles(Scene::new(&other).unwrap().observations).maps(None).unwrap();
     assert!(fit.warnings.iter().any(|warning| warning.contains("do not reproduce the profiles")), "{:?}", fit.warnings);

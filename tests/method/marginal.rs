@@ -1,4 +1,4 @@
-//! The marginal likelihood of stars that change, against an independent implementation (`tests/data/evolving`).
+//! The marginal likelihood of evolving spots, against an independent implementation (`tests/data/evolving`).
 
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
@@ -70,7 +70,7 @@ fn a_star_that_changes_is_told_from_one_that_does_not() {
     }
 }
 
-/// Maximum entropy has no part in it: no map without spots is refused, whatever the target chi2.
+/// Maximum entropy is not used: no map without spots is refused, whatever the target chi2.
 #[test]
 fn a_planet_of_a_star_without_spots_is_found() {
     let cycles: Vec<f64> = (0..18).map(|k| 0.37 * f64::from(k) + 0.05 * f64::from(k % 3)).collect();
@@ -102,7 +102,7 @@ fn a_planet_of_a_star_without_spots_is_found() {
     assert!(remarks.iter().all(|r| !r.text.contains("chi2")), "{remarks:?}");
 }
 
-/// What is known of the field beforehand counts where it is fitted, too.
+/// The prior of the field is also used where it is fitted.
 #[test]
 fn a_prior_of_the_field_counts_in_its_fit() {
     let (scene, values, _) = star("slow-planet", 600);
@@ -122,7 +122,7 @@ fn a_prior_of_the_field_counts_in_its_fit() {
     assert_eq!(below.at_bounds, ["spot_lifetime_d"]);
 }
 
-/// A share of them says where to begin; what is found is the best field of all of them.
+/// A subset of the profiles gives the start; the result is the best field for all of them.
 #[test]
 fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
     let cycles: Vec<f64> = (0..168).map(|k| 0.113 * f64::from(k) + 0.05 * f64::from(k % 3)).collect();
@@ -153,7 +153,8 @@ fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
     }
 }
 
-/// Some of the harmonics say all that the data know: of other fields, and of stars a standard error or two away.
+/// Some of the harmonics carry all information of the data: for other fields, and of stars a standard error or two
+/// away.
 #[test]
 fn harmonics_that_no_data_see_change_nothing() {
     let (scene, values, _) = star("slow-planet", 2000);
@@ -223,7 +224,7 @@ fn ln_z_is_that_of_its_expansion_in_star_and_field() {
             values.set(*p, p.to_physical(p.to_sampling(reference[*p]) + sign * sd));
             let (full, quadratic) = at(&values);
             println!("{}: sd {sd:.4}, {full:.3} {quadratic:.3}", p.name());
-            // over a standard deviation, where ln Z falls by a half with all else free and by more with all else held:
+            // over a standard deviation, where ln Z falls by a half with all else free and by more with all else fixed:
             // the third order, and second derivatives of the maps that the star's have not
             assert!((full - quadratic).abs() < 0.2 + 0.15 * quadratic.abs(), "{}: {full} {quadratic}", p.name());
         }

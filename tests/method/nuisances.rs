@@ -45,7 +45,7 @@ fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     hold_derivatives(&mut problem, imager.grid.len());
 }
 
-/// chi2 with nuisances integrated out is the smallest chi2 over their values, each paid for by its prior.
+/// chi2 marginalised over nuisances is the smallest chi2 over their values, each penalised by its prior.
 #[test]
 fn chi2_is_the_least_over_all_nuisances() {
     let imager = with_nuisances(1000, PRIORS);
@@ -87,7 +87,7 @@ fn no_prior_width_is_no_nuisance() {
     assert!(none.data.nuisances.is_empty());
     assert_eq!(chi2(&plain), chi2(&none));
     let narrow = with_nuisances(600, LineAndContinuum::of_numbers([1e-9; 3]));
-    // in proportion to the square of the width, which is 1e-6 of what the data tell
+    // in proportion to the square of the width, which is 1e-6 of the constraint by the data
     assert!((chi2(&narrow) / chi2(&plain) - 1.0).abs() < 1e-9);
 }
 
@@ -157,7 +157,7 @@ fn an_orbit_is_found_under_wandering_continua() {
     let [(k, sigma_k), (across, sigma_across)] = amplitudes(&scene);
     println!("with nuisances: {k:.4} +- {sigma_k:.4}, {across:.4} +- {sigma_across:.4}");
     assert!(((k - 0.1) / sigma_k).abs() < 2.5 && (across / sigma_across).abs() < 2.5);
-    // not much is lost to them: without wandering the error is 0.011
+    // they degrade little: without wandering the error is 0.011
     assert!(sigma_k < 0.02);
     let reference = Reference::build(&scene.imager, scene.settings.values, 0.97).unwrap();
     let fit = SurfaceMaps::of_reference(&scene.imager, &scene.observations, &reference);

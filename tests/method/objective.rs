@@ -59,7 +59,7 @@ fn of_orbits(entropy: Option<Entropy>) -> Vec<Posterior> {
     KINDS.map(|kind| Posterior::new(imager.clone(), space.clone(), kind, reference.clone())).to_vec()
 }
 
-/// What maps may hold.
+/// The content of maps.
 const MAPS: [Option<Entropy>; 2] = [None, Some(Entropy::BrightAndDark)];
 
 /// The start of a space with all parameters off by about one standard deviation each, in varying directions.
@@ -163,7 +163,7 @@ fn exact(posterior: &Posterior, theta: &[f64]) -> Map {
 }
 
 /// Errors of predictions at `theta`, where the map is `exact`: of the map, in its metric at the start, and of
-/// ln(lambda). A solver that takes whatever it starts from leaves the prediction as it is.
+/// ln(lambda). A solver that accepts any start returns the prediction unchanged.
 fn prediction_errors(posterior: &Posterior, theta: &[f64], (b, lambda_b): &Map) -> [f64; 2] {
     let careless = SolverSettings { tolerance: f64::INFINITY, ..SolverSettings::default() };
     let predicted = posterior.clone().with_settings(careless);
@@ -295,7 +295,7 @@ fn warm_starts_save_passes_and_change_nothing_else() {
         }
         println!("{:?}: {with} model applications instead of {without}", posterior.kind());
         assert!(3 * with < 2 * without, "{:?}: {with} model applications instead of {without}", posterior.kind());
-        // as many as they are worth, and none where nothing is far
+        // as many as their significance requires, and none where nothing is far
         assert_eq!(
             posterior.clone().with_warm_starts_for(std::slice::from_ref(&start), 10_000).warm_starts().count(),
             0

@@ -1,4 +1,4 @@
-//! The paraboloid and the marginals of landscapes whose answer is known.
+//! The paraboloid and the marginals of likelihood grids with known results.
 
 use dimcmc::internals::sampling::landscape::{
     Axis, Grid, Landscape, Marginal, Node, Paraboloid, Rule, Undefined, paraboloid, paraboloid_table,
@@ -10,7 +10,7 @@ fn axis(name: &str, min: f64, max: f64, nodes: usize) -> Axis {
     Axis { name: name.into(), min, max, nodes, periodic: name == "phi" }
 }
 
-/// The landscape of `log_likelihood`; where that is NaN the reconstruction failed.
+/// The likelihood grid of `log_likelihood`; where that is NaN the reconstruction failed.
 fn landscape(axes: &[Axis], log_likelihood: impl Fn(&[f64]) -> f64) -> Landscape {
     with_status(axes, |theta| (log_likelihood(theta), Status::Converged))
 }
@@ -38,7 +38,7 @@ struct Gaussian {
 }
 
 impl Gaussian {
-    /// Of the given error bars and correlations (upper triangle).
+    /// From the given error bars and correlations (upper triangle).
     fn new(axes: &[Axis], mean: &[f64], errors: &[f64], correlations: &[f64]) -> Self {
         let n = axes.len();
         let mut covariance = DMatrix::from_fn(n, n, |i, j| if i == j { errors[i] * errors[i] } else { 0.0 });
@@ -188,7 +188,7 @@ fn a_skewed_minimum_biases_little() {
         for (i, axis) in gaussian.axes.iter().enumerate() {
             let (one, error) = (found.parameters[&axis.name], gaussian.covariance[(i, i)].sqrt());
             let apart = one.vertex - gaussian.mean[i];
-            // the cubic is worth 0.05 at one sigma and 0.4 at two, a third of it linear within the region
+            // the cubic term is 0.05 at one sigma and 0.4 at two, a third of it linear within the region
             assert!((apart - apart.round()).abs() < 0.2 * error, "{}: {one:?}", axis.name);
             assert!((one.error / error - 1.0).abs() < 0.05, "{}: {one:?}", axis.name);
         }

@@ -141,8 +141,8 @@ fn sigmas(quadratic: &VelocityQuadratic) -> Vec<f64> {
     scan(quadratic, &[0.37, 0.61, 0.83, 1.39]).iter().map(sigma).collect()
 }
 
-/// What a plan of data that have been taken says of K is what a search of them does: offsets, jitters, resolution and
-/// bins of each set, the light curve, and the star's parameters are counted in the same way.
+/// The uncertainty of K in a plan of existing data is that of a search of them: offsets, jitters, resolution and bins
+/// of each set, the light curve, and the star's parameters are counted in the same way.
 #[test]
 fn a_plan_of_what_was_taken_is_its_search() {
     for (zero_point, light) in [(json!("fitted"), true), (json!(0.1), true), (json!("fitted"), false)] {

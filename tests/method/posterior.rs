@@ -2,8 +2,8 @@
 //! likelihood at lambda = 1e-3 on the oracle's pixel table), on the oracle's data.
 //!
 //! Tolerances: the reference chain and ours have effective sizes of 600 and of 1000, so that medians agree to 0.065
-//! sigma (`1.25 (1/600 + 1/1000)^1/2`) and widths to 4.6 % by chance alone; what is asked for is three times that on
-//! the same pixels, and up to half as much again on another grid of pixels or for fewer draws.
+//! sigma (`1.25 (1/600 + 1/1000)^1/2`) and widths to 4.6 % by chance alone; the tolerance is three times that on the
+//! same pixels, and up to half as much again on another grid of pixels or for fewer draws.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};

@@ -1,4 +1,4 @@
-//! The response against the obvious loop that the benches measure it by.
+//! The response against the plain loop that the benches compare it with.
 
 #[path = "../common/plain_loop.rs"]
 mod plain_loop;

@@ -1,5 +1,5 @@
-//! What is written reads back, whatever it is: profiles, lists, light curves, tables, configs, chains, landscapes,
-//! manifests. And of a file of lines that was cut anywhere, the whole blocks before the cut.
+//! Files read back identically: profiles, lists, light curves, tables, configs, chains, likelihood grids, manifests. A
+//! file of lines cut anywhere gives the complete blocks before the cut.
 
 use dimcmc::internals::data::io::csv::{Columns, Table, Words, quoted};
 use dimcmc::internals::data::io::journal::{self, Journal};

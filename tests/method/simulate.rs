@@ -105,7 +105,7 @@ fn depths(observations: &Observations) -> Vec<f64> {
     observations.profiles.iter().flat_map(|p| p.intensity.clone()).collect()
 }
 
-/// Zero points move profiles by what `truth.json` says of them, and leave the noise as it is.
+/// RV jitter shifts profiles by the values in `truth.json`, and does not change the noise.
 #[test]
 fn zero_points_are_velocities_of_their_own() {
     let with = |snr: Option<f64>, jitter: f64| {
@@ -119,7 +119,7 @@ fn zero_points_are_velocities_of_their_own() {
     let config::ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!() };
     assert!(simulation.zero_points_kms().is_empty());
     let zero_points = Simulation { velocity_jitter_kms: 0.5, ..simulation }.zero_points_kms();
-    // fifty numbers know their scatter to 10 %
+    // fifty numbers constrain their rms to 10 %
     assert!((rms(&zero_points) / 0.5 - 1.0).abs() < 0.25, "{}", rms(&zero_points));
     let (still, moved) = (with(None, 0.0), with(None, 0.5));
     for ((still, moved), zero_point) in still.first_moments().iter().zip(moved.first_moments()).zip(&zero_points) {
@@ -227,7 +227,7 @@ fn the_scene_of_the_demo() {
     assert!((coverage / wanted - 1.0).abs() < 5e-3, "{coverage} {wanted}");
 }
 
-/// A spot that comes and goes.
+/// An evolving spot.
 fn passing(peak_d: f64, lifetime_d: f64, winding: f64) -> Spot {
     let life = Some(Life { peak_d, lifetime_d, winding });
     Spot { longitude: 1.0, latitude: 0.5, radius: 0.3, filling: 0.8, life }
@@ -257,7 +257,7 @@ fn areas_of_spots_that_come_and_go() {
     }
 }
 
-/// Only pixels at which something changes are reckoned anew: they come out as if all were, faculae among them.
+/// Only pixels with changes are recomputed: the result equals that of recomputing all, including faculae.
 #[test]
 fn maps_of_a_changing_star_are_those_of_each_moment() {
     let (mut simulation, settings) = demo_simulation();
@@ -280,8 +280,8 @@ fn maps_of_a_changing_star_are_those_of_each_moment() {
     }
 }
 
-/// Profiles of a star with one spot that comes and goes and one that stays, against a sum over small pixels: disc,
-/// rotation, differential rotation, limb darkening, line and orbit are written here once more.
+/// Profiles of a star with one evolving and one static spot, against a sum over small pixels: disc, rotation,
+/// differential rotation, limb darkening, line and orbit are written here once more.
 #[test]
 fn profiles_of_a_changing_star_are_those_of_a_plain_sum() {
     let (simulation, settings) = demo_simulation();
@@ -399,7 +399,7 @@ fn random_spots_are_a_function_of_their_seed() {
             assert!((sum - turned).abs() < 1e-9, "{latitude}: {sum} {turned}");
         }
     }
-    // of a star that may change there is one
+    // for evolving spots there is one
     let changing = of_config(|json| json["imaging"]["objective"] = json!("marginal-likelihood"));
     let middle = simulation_of(&changing).mid_time_d();
     assert!(changing.true_map() == changing.true_map_at(middle));
@@ -441,7 +441,7 @@ fn seasons_are_where_they_should_be() {
     assert!((18..=33).contains(&left), "{left}");
     let in_nights = |t: &&f64| (0..3).any(|season| (0.0..12.0).contains(&(**t - 1000.0 - 200.0 * f64::from(season))));
     assert_eq!(times.iter().filter(in_nights).count(), times.len(), "all are in a season");
-    // without clouds all nights are there, and those that were stay as they are
+    // without clouds all nights are there, and the former ones are unchanged
     let clear = of_config(|json| json["observations"]["simulate"]["schedule"]["clouds"] = json!(0));
     let all = simulation_of(&clear).times_d;
     assert!(times.iter().all(|t| all.contains(t)) && all.len() > times.len());

@@ -1,5 +1,5 @@
-//! Parameters of the star's surface as free parameters: a star simulated with others than the config's is found again,
-//! and what does not free them does not know of them.
+//! Parameters of the star's surface as free parameters: values other than the config's are recovered, and configs that
+//! fix them are unaffected.
 
 use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
@@ -54,8 +54,8 @@ fn a_surface_other_than_the_configs_is_found() {
     assert_eq!(written.as_object().unwrap().len(), 11, "the eight and the free ones: {written}");
 }
 
-/// What data say of the contrast: spots so bright that they would have to fill more than all of a pixel are out; but
-/// the darker they are, the fewer there need be, and the higher the entropy is.
+/// Constraints on the contrast: spots so bright that they would have to fill more than all of a pixel are out; but the
+/// darker they are, the fewer there need be, and the higher the entropy is.
 #[test]
 fn the_contrast_has_an_upper_bound_alone() {
     let scene = scene(|json| {
@@ -87,8 +87,7 @@ fn what_is_not_free_is_not_written() {
     assert_eq!(one.settings.values[Parameter::Contrast], one.imager.star.contrast);
 }
 
-/// Which is why a nuisance of every profile's equivalent width and a free one that all share are told apart by priors
-/// alone.
+/// Hence a nuisance of every profile's equivalent width and a common free one are distinguished only by priors.
 #[test]
 fn equivalent_widths_scale_the_depth() {
     let at = |width: f64| {

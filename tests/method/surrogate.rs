@@ -1,4 +1,4 @@
-//! The surrogate posterior: its draws follow its density, and the move leaves any posterior as it is, however poor the
+//! The surrogate posterior: its draws follow its density, and the move preserves any posterior, however poor the
 //! surrogate.
 
 use crate::common::{imager, oracle, truth};

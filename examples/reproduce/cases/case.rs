@@ -1,8 +1,8 @@
 //! One simulated star, and the three routes to its planet's orbit: grid and paraboloid (the paper's), chain,
 //! periodogram.
 //!
-//! Grid and chain share the search for the reference. Where the star is modelled wrongly the target chi2 may be out of
-//! reach; then it is raised to what is in reach, as an observer would, and the outcome says so.
+//! Grid and chain share the search for the reference. With a wrong model of the star the target chi2 may be out of
+//! reach; then it is raised to an attainable value, as an observer would do, and the outcome reports it.
 
 use super::{Estimate, Failure, Interrupted, Outcome, Route, with};
 use dimcmc::internals::data::config::GridSettings;
@@ -28,7 +28,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Instant;
 
-/// Nodes to each side of the best orbit along every axis, in standard deviations of the curvature.
+/// Nodes on each side of the best orbit along every axis, in standard deviations of the curvature.
 const REACH: f64 = 3.0;
 
 /// Shortest period on a grid, over the rotation period.
@@ -38,10 +38,10 @@ const SHORTEST: f64 = 0.3;
 /// there is an image at the best orbit.
 const ABOVE_REACHED: [f64; 5] = [1.05, 1.08, 1.12, 1.2, 1.5];
 
-/// Where the nodes of a grid over K, Porb/Prot and phi are.
+/// The nodes of a grid over K, Porb/Prot and phi.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Nodes {
-    /// So many along each axis, around the best orbit.
+    /// This many along each axis, around the best orbit.
     Around(usize),
     /// Ends and number of nodes of each axis.
     At([(f64, f64, usize); 3]),
@@ -58,12 +58,12 @@ pub struct Case {
     pub grid: Option<Nodes>,
     /// Whether there is a chain.
     pub chain: bool,
-    /// Draws of the periodogram's false alarms, if that route is taken.
+    /// Draws for the periodogram's false-alarm probability, if that route is taken.
     pub periodogram: Option<usize>,
 }
 
 impl Case {
-    /// Runs it; landscape and chain are kept in `folder`.
+    /// Runs it; likelihood grid and chain are stored in `folder`.
     pub fn run(&self, folder: &Path, pool: &Pool) -> Result<Outcome, Failure> {
         write_json(&folder.join("config.json"), &self.config)?;
         match self.tried(folder, pool) {
@@ -108,7 +108,8 @@ impl Case {
     }
 }
 
-/// Whether it lies in the star: one that cannot be imaged, or has no best orbit, is a result of an experiment.
+/// Whether the failure is due to the star: one that cannot be imaged, or has no best orbit, is a result of an
+/// experiment.
 pub fn is_of_the_star(error: &Failure) -> bool {
     error.is::<SearchError>()
         || error.is::<ReferenceError>()
@@ -172,7 +173,7 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
     Err(last.into())
 }
 
-/// The landscape on `grid`, kept in `folder`, and its paraboloid.
+/// The likelihood grid on `grid`, stored in `folder`, and its paraboloid.
 pub fn landscape(
     scene: &Scene,
     found: Found,
@@ -185,7 +186,7 @@ pub fn landscape(
     let free = scene.settings.free.iter().filter(|f| names.iter().any(|name| name == f.parameter.name()));
     let plan = GridSettings { free: free.copied().collect(), grid };
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    // one that was stopped goes on
+    // a stopped one is resumed
     let mut survey = match GridScan::resume(scene, &plan, folder) {
         Err(GridScanError::Origin(_)) => GridScan::begin(scene, &plan, found, folder, GridScan::claim(folder, true)?)?,
         resumed => resumed?,
@@ -209,7 +210,7 @@ pub fn landscape(
     Ok((route, survey))
 }
 
-/// The chain, kept in `folder`, and its summary.
+/// The chain, stored in `folder`, and its summary.
 pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, RunSummary), Failure> {
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();

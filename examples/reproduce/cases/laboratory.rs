@@ -1,7 +1,7 @@
-//! Where experiments are run: with what effort, in which folder; and what is done already.
+//! Execution of experiments: effort, folder, and finished cases.
 //!
-//! Every case is a file of its own once it is done, with the config that it was run with. A laboratory that was stopped
-//! goes on with the first case that is not there, or was run with another config or version.
+//! Every finished case has its own file, with its config. A stopped laboratory resumes at the first case that is
+//! missing, or was run with another config or version.
 
 use super::{Case, Failure, Outcome};
 use dimcmc::Pool;
@@ -11,15 +11,15 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Runs experiments and keeps what they came to.
+/// Runs experiments and stores their outcomes.
 pub struct Laboratory<'a> {
     /// Folder of the raw results, in a folder for each row.
     pub folder: PathBuf,
-    /// A reduced version of everything, to see that it works: fewer cases, pixels and draws.
+    /// A reduced version of everything, to check that it works: fewer cases, pixels and draws.
     pub quick: bool,
-    /// Who reconstructs, until told to stop.
+    /// Evaluator of reconstructions, until a stop is requested.
     pub pool: &'a Pool,
-    /// Told what is under way.
+    /// Receives the progress.
     pub report: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -28,20 +28,20 @@ pub struct Laboratory<'a> {
 #[error("interrupted; the same command goes on where it was")]
 pub struct Interrupted;
 
-/// A star that is done.
+/// A finished star.
 #[derive(Serialize, Deserialize)]
 struct Kept<T> {
-    /// The config, or the case, that it was run with.
+    /// The config, or the case, of the run.
     config: Value,
     version: String,
     result: T,
 }
 
-/// Name of the file of a case that is done.
+/// Name of the file of a finished case.
 const OUTCOME: &str = "outcome.json";
 
 impl Laboratory<'_> {
-    /// What the cases of `row` come to, in order; those that are done are read.
+    /// Outcomes of the cases of `row`, in order; finished ones are read.
     pub fn outcomes(&self, row: &str, cases: &[Case]) -> Result<Vec<Outcome>, Failure> {
         let outcome = |(k, case): (usize, &Case)| {
             (self.report)(&format!("{row}, case {} of {}: {}", k + 1, cases.len(), case.name));
@@ -50,8 +50,8 @@ impl Laboratory<'_> {
         cases.iter().enumerate().map(outcome).collect()
     }
 
-    /// What a star of a row comes to by `work`, which is given a folder for it. It is read where it is done already
-    /// with that config or case.
+    /// The outcome of a star of a row by `work`, which receives a folder for it. It is read if already done with that
+    /// config or case.
     pub fn kept<T: Serialize + DeserializeOwned>(
         &self,
         row: &str,
@@ -79,17 +79,17 @@ impl Laboratory<'_> {
         Ok(path)
     }
 
-    /// Whether to go on: if not, [`Interrupted`].
+    /// Whether to continue: if not, [`Interrupted`].
     pub fn go_on(&self) -> Result<(), Failure> {
         if self.pool.stopped() { Err(Interrupted.into()) } else { Ok(()) }
     }
 
-    /// The one or the other, as the effort is full or quick.
+    /// One or the other, for full or quick effort.
     pub fn full_or_quick<T>(&self, full: T, quick: T) -> T {
         if self.quick { quick } else { full }
     }
 
-    /// The first and the last of many cases where it has to be quick.
+    /// The first and the last of many cases for quick effort.
     pub fn some<T>(&self, mut all: Vec<T>) -> Vec<T> {
         if self.quick && all.len() > 2 {
             all.drain(1..all.len() - 1);

@@ -1,4 +1,5 @@
-//! Simulated stars and the ways to the orbit of each: grid and paraboloid, chain, periodogram. What is done is kept.
+//! Simulated stars with three methods for the orbit of each: grid and paraboloid, chain, periodogram. Results are
+//! stored.
 
 pub mod case;
 mod laboratory;

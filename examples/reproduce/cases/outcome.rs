@@ -1,4 +1,4 @@
-//! What a case came to: three estimates of the same orbit, and what each of them took.
+//! The outcome of a case: three estimates of the same orbit, with their costs.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -10,24 +10,24 @@ pub struct Estimate {
     pub value: f64,
     /// Its interval.
     pub ci68: [f64; 2],
-    /// Its 95 % interval; of an estimate with an error bar, two of them to each side.
+    /// Its 95 % interval; for an estimate with an error bar, two of them on each side.
     pub ci95: [f64; 2],
 }
 
-/// One way to the orbit.
+/// One method for the orbit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Route {
-    /// The parameters by name; empty where the route came to nothing.
+    /// The parameters by name; empty where the method failed.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Reconstructions that it took, the search for the reference left out.
+    /// Number of reconstructions, without the search for the reference.
     pub reconstructions: usize,
-    /// Seconds that it took; not known where it was stopped and gone on with.
+    /// Seconds; unknown where it was stopped and resumed.
     pub seconds: Option<f64>,
-    /// What is to be said of it: why it came to nothing, or that a chain did not converge.
+    /// A remark: why it failed, or that a chain did not converge.
     pub note: Option<String>,
 }
 
-/// What a case came to.
+/// The outcome of a case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Why there is no result at all.
@@ -59,7 +59,7 @@ pub struct Outcome {
 /// Ends of the names of columns with the numbers of an estimate.
 pub const ENDS: [&str; 5] = ["median", "low68", "high68", "low95", "high95"];
 
-/// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all
+/// Fraction of `of` and its binomial error: that of the fraction with one more of either kind, which is not 0 where all
 /// are alike.
 pub fn share(count: usize, of: usize) -> [f64; 2] {
     let n = of.max(1) as f64;
@@ -74,7 +74,7 @@ impl Estimate {
         Estimate { value, ci68: around(1.0), ci95: around(2.0) }
     }
 
-    /// The numbers of the columns [`ENDS`], NaN where there is no estimate.
+    /// The values of the columns [`ENDS`], NaN where there is no estimate.
     pub fn numbers(estimate: Option<&Self>) -> [f64; 5] {
         estimate.map_or([f64::NAN; 5], |e| [e.value, e.ci68[0], e.ci68[1], e.ci95[0], e.ci95[1]])
     }
@@ -86,19 +86,19 @@ impl Estimate {
 }
 
 impl Outcome {
-    /// The routes that were taken, by name.
+    /// The methods used, by name.
     pub fn routes(&self) -> impl Iterator<Item = (&'static str, &Route)> {
         let all = [("grid", &self.grid), ("chain", &self.chain), ("periodogram", &self.periodogram)];
         all.into_iter().filter_map(|(name, route)| Some((name, route.as_ref()?)))
     }
 
-    /// What the chain says of a parameter.
+    /// The chain's estimate of a parameter.
     pub fn by_chain(&self, name: &str) -> Option<&Estimate> {
         self.chain.as_ref()?.parameters.get(name)
     }
 
-    /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any turn. A
-    /// star without a result counts as one that is missed.
+    /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any cycle. A
+    /// star without a result counts as missed.
     pub fn is_covered(&self, name: &str, level: usize) -> bool {
         let (Some(one), Some(truth)) = (self.by_chain(name), self.truth.get(name)) else { return false };
         let [low, high] = [one.ci68, one.ci95][level];
@@ -106,7 +106,7 @@ impl Outcome {
         turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))
     }
 
-    /// Value minus the injected one; of a phase, the shorter way round.
+    /// Value minus the injected one; for a phase, the shorter way round.
     pub fn deviation(&self, name: &str, estimate: &Estimate) -> Option<f64> {
         let apart = estimate.value - self.truth.get(name)?;
         Some(if name == "phi" { apart - apart.round() } else { apart })

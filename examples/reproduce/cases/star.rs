@@ -1,4 +1,4 @@
-//! The paper's star as a config, and how an experiment changes it.
+//! The paper's star as a config, and its changes for an experiment.
 
 use serde_json::Value;
 

@@ -1,5 +1,4 @@
-//! What a config leaves to the profiles, measured before anything else: their errors, and the scatter of their velocity
-//! zero points.
+//! Quantities that a config leaves to the profiles, measured first: their uncertainties and their RV jitter.
 
 use super::imager::imager;
 use super::seasons;
@@ -11,8 +10,8 @@ use crate::surface::calibration::noise;
 use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors, NoiseError};
 use crate::surface::imaging::Imager;
 
-/// The velocity zero points of the profiles, where there are any, and how large they are where the profiles say so. The
-/// target chi2 is per datum, independent or not.
+/// The RV jitter of the profiles, if any, and its measured size where it is fitted. The target chi2 is per datum,
+/// independent or not.
 pub(super) fn zero_points(
     settings: &Settings,
     imager: &Imager,
@@ -22,7 +21,7 @@ pub(super) fn zero_points(
     let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
     let (sd_kms, measured) = match jitter {
         VelocityJitter::Number(0.0) => return Ok((None, None)),
-        // it is counted with the maps
+        // it is included with the maps
         _ if settings.imaging.objective.properties().marginalises => return Ok((None, None)),
         VelocityJitter::Number(sd_kms) => (sd_kms, None),
         VelocityJitter::Word(_) => {
@@ -34,12 +33,13 @@ pub(super) fn zero_points(
     Ok((Some(zero_points), measured))
 }
 
-/// Errors and velocity zero points are settled in turn that many times at most, until errors move by less than this
-/// part.
+/// Uncertainties and RV jitter are measured in turn at most this many times, until uncertainties change by less than
+/// this fraction.
 const SETTLED: (usize, f64) = (3, 0.03);
 
-/// The errors that the config leaves to the profiles of a `set`, if it does: `whole` as they are in their files, and
-/// `used` as they enter the model, errors as quoted. A map is of each of the `seasons` of all sets.
+/// The uncertainties that the config leaves to the profiles of a `set`, if it does: `whole` profiles as in their files,
+/// and `used` ones as they enter the model, with quoted uncertainties. There is one map per season in `seasons` of all
+/// sets.
 pub(super) fn measured(
     settings: &Settings,
     set: &DataSetSettings,
@@ -54,7 +54,7 @@ pub(super) fn measured(
     let fault = |e: NoiseError| settings.fault(&e.key().replacen("observations", &set.key, 1), &e.to_string());
     let whole = whole.clone().over_continuum(set.continuum_level());
     let continuum = noise::by_continuum(&whole, &set.star, &settings.values, wanted).map_err(fault)?;
-    // what a map leaves over is no noise where stars may change
+    // residuals of a map are not noise where spots may evolve
     if !wanted.measured || settings.imaging.objective.properties().map_changes {
         return Ok(Some(continuum));
     }
@@ -68,13 +68,14 @@ pub(super) fn measured(
     let before = scaled(&continuum);
     let mut measured = continuum.clone();
     for _ in 0..SETTLED.0 {
-        // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
+        // RV offsets of profiles appear as residuals of a map without jitter, and underestimated uncertainties look
+        // like RV jitter
         let zero_points = match settings.imaging.chi2_target.number() {
             Some(target) => {
                 let target = target / continuum.correlated_bins;
                 zero_points(settings, &imager(scaled(&measured))?, settings.velocity_jitter, target)?.0
             }
-            // one that is chosen goes by velocities: the config has no zero points beside it
+            // a given one depends on velocities: the config has no RV jitter with it
             None => None,
         };
         let with_factor = |factor: f64| {

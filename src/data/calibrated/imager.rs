@@ -1,5 +1,5 @@
-//! From a config and the observations of its data sets to what they are imaged with, the velocity offsets of the sets
-//! held where they belong.
+//! From a config and the observations of its data sets to their imager, with the RV offsets of the sets at their
+//! values.
 
 use super::seasons::with_seasons;
 use super::strength::star_for;
@@ -15,11 +15,11 @@ use crate::surface::calibration::star::too_wide_kms;
 use crate::surface::expansion::nuisances;
 use crate::surface::imaging::{Imager, ZeroPointPrior};
 
-/// What the observations `parts` of these data `sets` are imaged with, with a map of each of the `seasons`. An offset
-/// that is to be found is at 0.
+/// The imager of the observations `parts` of these data `sets`, with a map for each of the `seasons`. An offset to be
+/// fitted is at 0.
 ///
 /// # Errors
-/// Settings that make no sense with these observations.
+/// Settings that are invalid for these observations.
 pub fn imager(
     settings: &Settings,
     sets: &[DataSetSettings],
@@ -79,7 +79,7 @@ pub fn imager(
     })
 }
 
-/// Finds the velocity offsets of data sets that are fitted, and holds them in `imager`.
+/// Fits the free RV offsets of data sets, and sets them in `imager`.
 pub(super) fn hold_offsets(
     settings: &Settings,
     imager: &mut Imager,

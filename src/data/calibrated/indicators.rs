@@ -1,4 +1,4 @@
-//! The activity indicators of a config, brought to few values.
+//! The activity indicators of a config, binned to few values.
 
 use super::light_curves::{far_from_profiles, remembered_d, with_tables};
 use crate::data::config::{ConfigError, IndicatorSettings, Settings};
@@ -13,11 +13,11 @@ const FEWEST: usize = 6;
 /// ... and most: each is a row of the covariance of the data.
 const MOST: usize = 400;
 
-/// The values of each indicator that lie outside of its excluded windows and not far from all profiles, the mean of
-/// neighbours where there are many; and what was made of them, in words.
+/// The values of each indicator that lie outside of its excluded windows and near profiles in time, the mean of
+/// neighbours where there are many; and a description in words.
 ///
 /// # Errors
-/// One of which too few or too many are left, or whose times are all far from those of the profiles.
+/// An indicator with too few or too many remaining values, or whose times are all far from those of the profiles.
 pub(super) fn used(
     settings: &Settings,
     parts: &[Observations],

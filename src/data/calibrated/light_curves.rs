@@ -1,4 +1,4 @@
-//! The light curves of a config, brought to bins.
+//! The light curves of a config, binned.
 
 use crate::data::config::{ConfigError, LightCurveSettings, OutlierTreatment, Settings};
 use crate::data::dataset::is_within;
@@ -10,13 +10,13 @@ use crate::surface::photometry::{Flux, LightCurve, bin_width_d, outliers};
 use sha2::{Digest, Sha256};
 use std::ops::Range;
 
-/// Spots know nothing of themselves after so many lifetimes.
+/// Spots are uncorrelated after this many lifetimes.
 const FORGOTTEN: f64 = 5.0;
 
 /// Fewest measurements of a light curve.
 const FEWEST: usize = 3;
 
-/// As many outliers are named.
+/// Largest number of outliers that are named.
 const NAMED: usize = 8;
 
 /// A light curve in bins.
@@ -24,21 +24,21 @@ pub(super) struct Binned {
     pub curve: LightCurve,
     /// How many measurements lie within its excluded windows.
     left_out: usize,
-    /// What was made of it on reading, and what is wild in it.
+    /// Remarks on its reading and its outliers.
     notes: Vec<String>,
 }
 
-/// What of a light curve goes into its bins.
+/// The measurements of a light curve that are binned.
 struct Kept {
     fluxes: Vec<Flux>,
     excluded: usize,
     notes: Vec<String>,
 }
 
-/// The light curves of `settings`, of which this was `measured`.
+/// The light curves of `settings`, with these `measured` values.
 ///
 /// # Errors
-/// One of which nothing is left.
+/// A light curve without remaining measurements.
 pub(super) fn binned(settings: &Settings, measured: &[Measurements]) -> Result<Vec<Binned>, ConfigError> {
     let curves = || settings.light_curves.iter();
     let kept = curves().zip(measured).map(|(curve, all)| kept(settings, curve, all)).collect::<Result<Vec<_>, _>>()?;
@@ -52,7 +52,7 @@ pub(super) fn binned(settings: &Settings, measured: &[Measurements]) -> Result<V
     Ok(curves().zip(kept).map(in_bins).collect())
 }
 
-/// What lies outside of the excluded windows and is not wild, errors scaled.
+/// Measurements outside of the excluded windows that are not outliers, uncertainties scaled.
 fn kept(settings: &Settings, curve: &LightCurveSettings, all: &Measurements) -> Result<Kept, ConfigError> {
     let is_kept = |one: &&Flux| !is_within(&curve.exclude, one.time_d);
     let mut fluxes: Vec<Flux> = all.fluxes.iter().filter(is_kept).copied().collect();
@@ -82,7 +82,7 @@ fn kept(settings: &Settings, curve: &LightCurveSettings, all: &Measurements) -> 
     Ok(Kept { fluxes, excluded, notes })
 }
 
-/// Which measurements are left out as wild, and what their neighbours let expect.
+/// Measurements left out as outliers, and the values expected from their neighbours.
 fn wild_note(fluxes: &[Flux], wild: &[(usize, f64)], key: &str) -> Option<String> {
     let runs: Vec<&[(usize, f64)]> = wild.chunk_by(|a, b| a.0 + 1 == b.0).collect();
     let off = |(k, expected): (usize, f64)| (fluxes[k].flux - expected).abs();
@@ -124,7 +124,7 @@ fn dips_note(fluxes: &[Flux], dips: &[Range<usize>], key: &str) -> Option<String
     (!dips.is_empty()).then_some(text)
 }
 
-/// The bins of all light curves, which must tell something of the spots that the profiles see.
+/// The bins of all light curves, which must constrain the spots that the profiles show.
 ///
 /// # Errors
 /// A light curve that does not.
@@ -142,7 +142,7 @@ pub(super) fn near(
     Ok(all.iter().map(|binned| binned.curve.clone()).collect())
 }
 
-/// For how long (d) spots know of themselves.
+/// How long (d) spots remain correlated.
 pub(super) fn remembered_d(settings: &Settings) -> f64 {
     FORGOTTEN
         * match settings.known_field().lifetime {
@@ -152,7 +152,7 @@ pub(super) fn remembered_d(settings: &Settings) -> f64 {
         }
 }
 
-/// That times (d), in their order, are all so far from those of the profiles that no spot lives that long.
+/// Whether all times (d), in their order, are farther from those of the profiles than spots live.
 pub(super) fn far_from_profiles(settings: &Settings, parts: &[Observations], of_bins: &[f64]) -> Option<String> {
     let remembered_d = remembered_d(settings);
     let times_d: Vec<f64> = parts.iter().flat_map(Observations::times_d).collect();
@@ -176,12 +176,12 @@ pub(super) fn far_from_profiles(settings: &Settings, parts: &[Observations], of_
 }
 
 impl Binned {
-    /// What was left out and converted, a sentence each.
+    /// Exclusions and conversions, one sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// What was made of it, in a line.
+    /// A description in one line.
     pub fn line(&self) -> String {
         let LightCurve { name, bins, segments, .. } = &self.curve;
         let sigma = bins.iter().map(|bin| bin.sigma).sum::<f64>() / bins.len() as f64;

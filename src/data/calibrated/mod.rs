@@ -1,6 +1,6 @@
-//! From observations as they are in their files to what enters the model, a new value: profiles within the velocity
-//! range and in units of their continua, errors scaled or measured, light curves in bins, a map for each season; and
-//! what is then measured on them before anything else: target chi2, velocity jitter, velocity offsets of data sets.
+//! From observations as read from their files to a new value for the model: profiles within the velocity range and in
+//! units of their continua, uncertainties scaled or measured, light curves in bins, a map for each season; and the
+//! quantities then measured on them: target chi2, RV jitter, RV offsets of data sets.
 
 mod errors;
 mod imager;
@@ -32,35 +32,35 @@ use sha2::{Digest, Sha256};
 pub struct Calibrated {
     /// The profiles; of several data sets one after the other.
     pub observations: Observations,
-    /// SHA-256 (hex): of the bytes of their files where these are what is used, of the numbers where they are not.
+    /// SHA-256 (hex): of the bytes of their files where these are used, else of the numbers.
     pub sha256: String,
     /// What was measured on them.
     pub measured: Measured,
-    /// Target chi2 per datum, of which noise that several bins share makes fewer; where the config leaves it to the
-    /// observations it is measured.
+    /// Target chi2 per datum, adjusted for noise that is correlated between bins; measured where the config leaves it
+    /// to the observations.
     pub chi2_target: f64,
-    /// What they are imaged with; indicators come in once they are fitted.
+    /// Their imager; indicators are added once they are fitted.
     pub imager: Imager,
     /// The values of each indicator, in the order of time.
     pub indicators: Vec<Vec<Flux>>,
 }
 
 impl Calibrated {
-    /// The observations of `data` as `settings` want them.
+    /// The observations of `data` prepared according to `settings`.
     ///
     /// # Errors
-    /// Settings that make no sense with these observations.
+    /// Settings that are invalid for these observations.
     pub fn of(settings: &Settings, data: &Dataset) -> Result<Self, SceneError> {
         let light_curves = light_curves::binned(settings, &data.light_curves)?;
         let sets = || settings.sets.iter().zip(&data.sets);
         let mut parts = sets().map(|(set, profiles)| used(set, profiles)).collect::<Result<Vec<_>, _>>()?;
-        // errors are what maps leave over, and a map is of a season of all sets
+        // uncertainties are measured on residuals of maps, and a map is of one season of all sets
         let seasons = seasons::seasons(settings, &parts)?;
         let (mut errors, mut hashes) = (Vec::new(), Vec::new());
         for ((set, profiles), part) in sets().zip(&mut parts) {
             let measured = errors::measured(settings, set, &profiles.observations, part, &seasons)?;
             measured.iter().for_each(|measured| measured.apply(part));
-            // cut and factor are the config's, whose own fingerprint has them
+            // velocity range and factor are part of the fingerprint of the config
             let of_files = profiles.sha256.clone().filter(|_| measured.is_none() && set.continuum_level() == 1.0);
             hashes.push(of_files.unwrap_or_else(|| fingerprint(part)));
             errors.push(measured);
@@ -108,11 +108,11 @@ impl Calibrated {
         Ok(Calibrated { observations, sha256, measured, chi2_target, imager, indicators })
     }
 
-    /// The same with other profiles of each data set than those that it was measured on: target chi2, velocity jitter
-    /// and velocity offsets of data sets are held.
+    /// The same with other profiles of each data set than those used for measurement: target chi2, RV jitter and RV
+    /// offsets of data sets are kept.
     ///
     /// # Errors
-    /// Profiles that make no sense.
+    /// Profiles that are invalid.
     pub fn of_others(self, settings: &Settings, parts: Vec<Observations>) -> Result<Self, ConfigError> {
         let mut imager = imager(settings, &settings.sets, &parts, &self.measured.seasons)?;
         imager.light_curves = self.imager.light_curves;
@@ -129,10 +129,10 @@ impl Calibrated {
     }
 }
 
-/// The light curves of `data`, beside profiles of these `parts`.
+/// The light curves of `data`, together with profiles of these `parts`.
 ///
 /// # Errors
-/// One of which nothing is left, or that tells nothing of the spots of these profiles.
+/// A light curve without remaining measurements, or too far in time to constrain the spots of these profiles.
 pub fn light_curves(
     settings: &Settings,
     data: &Dataset,
@@ -141,14 +141,14 @@ pub fn light_curves(
     light_curves::near(settings, parts, &light_curves::binned(settings, &data.light_curves)?)
 }
 
-/// The profiles of each data set that `imager` knows of.
+/// The profiles of each data set that `imager` contains.
 pub fn of_sets(imager: &Imager, observations: &Observations) -> Vec<Observations> {
     let part = |set: std::ops::Range<usize>| Observations { profiles: observations.profiles[set].to_vec() };
     imager.profiles_of_sets().into_iter().map(part).collect()
 }
 
-/// The profiles of a `set` within its velocity range, in units of their continuum, errors times the factor of the
-/// config, with its exposure time where they have none.
+/// The profiles of a `set` within its velocity range, in units of their continuum, uncertainties times the factor of
+/// the config, with its exposure time where they have none.
 fn used(set: &DataSetSettings, profiles: &ProfileSet) -> Result<Observations, LsdError> {
     let mut used = match set.source {
         ObservationSource::Files { velocity_range_kms, sigma_scale, continuum_level, .. } => {
@@ -161,7 +161,7 @@ fn used(set: &DataSetSettings, profiles: &ProfileSet) -> Result<Observations, Ls
     Ok(used)
 }
 
-/// What a reader of results must know of the files.
+/// Remarks on the files for readers of results.
 fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
     let several = settings.sets.len() > 1;
     let of_set = |(set, profiles): (&DataSetSettings, &ProfileSet)| {
@@ -171,7 +171,7 @@ fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
     settings.sets.iter().zip(&data.sets).flat_map(of_set).collect()
 }
 
-/// Of `remarks` on profiles those that may be why nothing fits, each behind `; `.
+/// Those `remarks` on profiles that may explain a bad fit, each after `; `.
 pub fn suspects(remarks: &[String]) -> String {
     remarks.iter().filter(|remark| lsd::tells_of_wild_bin(remark)).map(|remark| format!("; {remark}")).collect()
 }
@@ -190,7 +190,7 @@ fn chi2_target(settings: &Settings, imager: &Imager) -> Result<(f64, Option<Chos
     }
 }
 
-/// Bins of which noise is correlated: number of data over that of independent ones.
+/// Correlation length of the noise in bins: number of data over that of independent ones.
 fn correlated_bins(parts: &[Observations], errors: &[Option<MeasuredErrors>]) -> f64 {
     let of_each: Vec<f64> = errors.iter().map(|e| e.as_ref().map_or(1.0, |e| e.correlated_bins)).collect();
     match &of_each[..] {

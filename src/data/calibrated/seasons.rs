@@ -1,4 +1,4 @@
-//! The seasons of a star that does not change within one: each has a map of its own.
+//! The seasons of static maps: one map per season.
 
 use crate::data::config::{ConfigError, DataSetSettings, ImagingSettings, ObservationSource, Settings};
 use crate::data::dataset::is_within;
@@ -7,8 +7,8 @@ use crate::star::observation::Observations;
 use crate::star::{OwnMap, StarSettings};
 use crate::surface::imaging::Imager;
 
-/// The seasons of profiles, in the order of time: as the config has them, or parted by gaps. A map that
-/// changes all the time has one.
+/// The seasons of profiles, in the order of time: as the config has them, or separated by gaps. An evolving map has one
+/// season.
 ///
 /// # Errors
 /// A profile in none of the config's seasons, and one of these without a profile.
@@ -65,7 +65,7 @@ fn season(star: &StarSettings, times: &[f64]) -> Season {
     Season { first_d, last_d, profiles: times.len(), epoch_d: star.epoch_d + cycles * star.rotation_period_d }
 }
 
-/// What images the observations with a map of each season.
+/// The imager of the observations with one map per season.
 pub(super) fn with_seasons(imager: Imager, seasons: &[Season]) -> Imager {
     let own_map = |time: f64| {
         let number = seasons.partition_point(|season| season.first_d <= time).saturating_sub(1);

@@ -1,12 +1,12 @@
-//! The strength of the local line where a config leaves it to the profiles: the area that they have.
+//! The strength of the local line where a config leaves it to the profiles: their area.
 
 use crate::data::config::{ConfigError, DataSetSettings, Settings};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::observation::Observations;
 use crate::star::{Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 
-/// Bins farther than this many local line widths beyond vsini are taken for continuum, and so many of them on a side
-/// will do.
+/// Bins farther than this many local line widths beyond vsini count as continuum, and this many of them on a side
+/// suffice.
 const BESIDE: f64 = 2.0;
 const FEWEST_BESIDE: usize = 2;
 
@@ -34,16 +34,16 @@ pub fn star_for(
         }
         star.line.equivalent_width_kms = Some(width);
         if beside.is_none() && star.line.gamma_kms > 0.0 {
-            // wings beyond the profiles count too
+            // wings beyond the velocity range count as well
             star.line.equivalent_width_kms = Some(width / share_observed(&star, &settings.values, observations));
         }
     }
     Ok(star)
 }
 
-/// Equivalent width (km/s) of the line below the continuum that each profile has beside it, wherever that is;
-/// `None` where the profiles do not reach into it. What an unspotted star loses by the same measure, wings under
-/// the continuum, is allowed for.
+/// Equivalent width (km/s) of the line below the continuum on both sides of each profile, whatever its level; `None`
+/// where the profiles do not reach into it. The loss of an unspotted star by the same measure (wings in the continuum)
+/// is corrected for.
 fn above_its_continuum(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> Option<f64> {
     let reach_kms = values[Parameter::Vsini] + BESIDE * star.line.sigma_kms;
     let mut unit = star.clone();
@@ -69,7 +69,7 @@ fn above_its_continuum(star: &StarSettings, values: &ParameterValues, observatio
     Some(observed / expected)
 }
 
-/// How much of its line an unspotted star shows within the velocities of `observations`.
+/// The fraction of its line that an unspotted star shows within the velocities of `observations`.
 fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
     let depths = unspotted(star, values, observations);
     let areas = depths.iter().sum::<f64>() * observations.step_kms() / observations.profiles.len() as f64;

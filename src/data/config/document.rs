@@ -1,5 +1,5 @@
 //! A config as a JSON document, before it is checked: read from a file, or built in code key by key; how it is laid out
-//! as text, and the way to what is checked.
+//! as text, and the path to the checked settings.
 
 use super::error::ConfigError;
 use super::settings::{Settings, resolve};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// What errors name where a config was not read from a file; paths in it start from the working directory.
 const NO_FILE: &str = "config";
 
-/// Keys of `imaging` by which a config means one map of a star that does not change.
+/// Keys of `imaging` that imply a static map.
 const OF_ONE_MAP: [&str; 3] = ["default_spot", "chi2_target", "unresolved_spots"];
 
 /// Longest line of a config as text.
@@ -48,25 +48,25 @@ impl Config {
     /// Reads the config at `path`. Paths in it start from its folder.
     ///
     /// # Errors
-    /// A file that cannot be read, is not JSON, or has a key that is unknown, missing, or does not make sense.
+    /// A file that cannot be read, is not JSON, or has a key that is unknown, missing, or invalid.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let bytes = std::fs::read(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
         Config::checked(&bytes, path)
     }
 
-    /// Reads a config that is at hand as JSON. Paths in it start from the working directory.
+    /// Reads a config in JSON. Paths in it start from the working directory.
     ///
     /// # Errors
-    /// As [`Config::load`], but for reading.
+    /// As [`Config::load`], except for reading.
     pub fn from_json(json: &str) -> Result<Self, ConfigError> {
         Config::from_json_at(json, NO_FILE.as_ref())
     }
 
-    /// Reads a config that is at hand as JSON, as if it came from the file at `path`: errors name it, and paths in the
-    /// config start from its folder.
+    /// Reads a config in JSON, as if it came from the file at `path`: errors name it, and paths in the config start
+    /// from its folder.
     ///
     /// # Errors
-    /// As [`Config::load`], but for reading.
+    /// As [`Config::load`], except for reading.
     pub fn from_json_at(json: &str, path: &Path) -> Result<Self, ConfigError> {
         Config::checked(json.as_bytes(), path)
     }
@@ -107,7 +107,7 @@ impl Config {
         key.split('.').try_fold(&self.json, |place, name| place.get(name))
     }
 
-    /// What is to be said of a config that names no objective: it had another one in older versions.
+    /// The remark on a config that names no objective, whose default differed in older versions.
     pub fn assumed_objective(&self) -> Option<String> {
         if self.get("imaging.objective").is_some() {
             return None;
@@ -122,7 +122,7 @@ impl Config {
         ))
     }
 
-    /// The file that it was read from, or what errors name in its place.
+    /// The file that it was read from, or its placeholder in errors.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -135,7 +135,7 @@ impl Config {
     /// With all defaults filled in, as results keep it.
     ///
     /// # Errors
-    /// A key that is unknown, missing, or does not make sense.
+    /// A key that is unknown, missing, or invalid.
     pub fn resolved(&self) -> Result<Value, ConfigError> {
         Ok(self.settings()?.resolved)
     }
@@ -143,7 +143,7 @@ impl Config {
     /// Checked, with all defaults.
     ///
     /// # Errors
-    /// A key that is unknown, missing, or does not make sense.
+    /// A key that is unknown, missing, or invalid.
     #[doc(hidden)]
     pub fn settings(&self) -> Result<Settings, ConfigError> {
         from_json(self.json.to_string().as_bytes(), &self.path)
@@ -153,7 +153,7 @@ impl Config {
 /// Resolves a config in JSON; `path` is what errors name and whose folder paths in it start from.
 ///
 /// # Errors
-/// What is not JSON, or has a key that is unknown, missing, or does not make sense.
+/// Text that is not JSON, or has a key that is unknown, missing, or invalid.
 pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
     let mut deserializer = serde_json::Deserializer::from_slice(without_mark(json));
     let written = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;

@@ -1,5 +1,5 @@
-//! A config to be written: the keys that a first config of an observed star has, in the order and layout in which
-//! people read them. Defaults that nobody asked about are left to the program.
+//! A config to be written: the keys of a first config of an observed star, in the order and layout for people. Other
+//! defaults are left to the program.
 
 use super::document::compact;
 use super::written::{
@@ -33,7 +33,7 @@ pub struct Draft {
     parameters: PerParameter<PriorSection>,
 }
 
-/// What is beside the profiles.
+/// Data other than the profiles.
 #[derive(Clone, Debug, Default)]
 pub struct Beside {
     /// The light curves.
@@ -42,7 +42,7 @@ pub struct Beside {
     pub indicators: Vec<IndicatorSection>,
 }
 
-/// Where the orbit and the systemic velocity are looked for: from the first of each to the last, uniformly but for the
+/// Prior ranges of the orbit and the systemic velocity: from the first of each to the last, uniformly but for the
 /// period, which is uniform in its logarithm.
 #[derive(Clone, Copy, Debug)]
 pub struct Sought {
@@ -55,8 +55,8 @@ pub struct Sought {
 }
 
 impl Draft {
-    /// A draft of these sections, as yet without data sets; without a planet as its start, but for the period
-    /// `porb_over_prot` it would have.
+    /// A draft of these sections, still without data sets; it starts without a planet, except for the period
+    /// `porb_over_prot`.
     pub fn new(
         star: Star<Option<f64>>,
         instrument: Instrument,
@@ -100,7 +100,7 @@ impl Draft {
         (value(Parameter::K), value(Parameter::PorbOverProt), value(Parameter::Phi))
     }
 
-    /// The same with this scatter of the velocity zero points.
+    /// The same with this RV jitter.
     pub fn with_jitter(mut self, jitter: VelocityJitter) -> Self {
         self.observations.sections.iter_mut().for_each(|set| set.velocity_jitter_kms = Some(jitter));
         self

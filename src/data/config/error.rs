@@ -1,5 +1,4 @@
-//! What can be wrong with a config: one line each, naming the file and the key. Serde's words are turned into the
-//! user's here.
+//! Errors of a config: one line each, naming the file and the key. Messages of serde are translated for users here.
 
 use crate::numerics::text::escaped;
 use std::path::{Path, PathBuf};
@@ -12,7 +11,7 @@ pub enum ConfigError {
     Read {
         /// The config.
         path: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         source: std::io::Error,
     },
     /// The file is not JSON.
@@ -24,7 +23,7 @@ pub enum ConfigError {
         line: usize,
         /// Column (from 1).
         column: usize,
-        /// What the parser says.
+        /// The message of the parser.
         problem: String,
     },
     /// A key that does not exist.
@@ -34,7 +33,7 @@ pub enum ConfigError {
         path: PathBuf,
         /// The key with all its parents, dotted.
         key: String,
-        /// The key it was perhaps meant to be, or all there are.
+        /// The key that was perhaps meant, or all allowed keys.
         hint: String,
     },
     /// A key whose value is wrong.
@@ -61,7 +60,7 @@ impl Fault {
         Fault { key: key.into(), problem: problem.into() }
     }
 
-    /// The error it makes in the config at `path`.
+    /// The error for the config at `path`.
     pub fn within(self, path: &Path) -> ConfigError {
         ConfigError::Key { path: path.into(), key: self.key, problem: self.problem }
     }
@@ -116,10 +115,10 @@ fn hint(given: &str, message: &str) -> String {
     }
 }
 
-/// Similarity (Jaro-Winkler, which favours a common beginning) from which a name is worth suggesting.
+/// Similarity (Jaro-Winkler, which favours a common beginning) from which a name is suggested.
 const SIMILAR: f64 = 0.75;
 
-/// The candidate most like `given`, whatever the case, if one is.
+/// The candidate most similar to `given`, ignoring case, if one is similar enough.
 fn nearest<'a>(given: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let given = given.to_lowercase();
     let similarity = |name: &str| strsim::jaro_winkler(&given, &name.to_lowercase());
@@ -163,7 +162,7 @@ fn below(parent: &str, field: &str) -> String {
     if parent == "." { field.to_string() } else { format!("{parent}.{field}") }
 }
 
-/// Text of the user's in one line of bounded length, control characters escaped.
+/// Text of the user in one line of bounded length, control characters escaped.
 fn one_line(text: &str) -> String {
     const LONGEST: usize = 300;
     let mut short: String = escaped(text).chars().take(LONGEST + 1).collect();

@@ -1,13 +1,13 @@
-//! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong
-//! together share.
+//! The fingerprint of a config: the part that must be identical for a chain to be resumed; and the part that two
+//! related configs share.
 
 use crate::model::{Elements, Parameter};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the names of
-/// star and spectrograph, the star's mass (with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent
-/// of the order of keys.
+/// SHA-256 (hex) of the resolved config without keys that may change on resuming: `$schema`, `grid`, `plan`, the names
+/// of star and spectrograph, the star's mass (with one planet), and the sampler's `steps`, `rhat` and `ess`.
+/// Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -31,7 +31,7 @@ pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
     Some(format!("{key} ({first} then, {second} now)"))
 }
 
-/// Whether two resolved configs count velocity zero points alike.
+/// Whether two resolved configs treat the RV jitter in the same way.
 pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
     const KEY: &str = "velocity_jitter_kms";
     // of several data sets it is one for all
@@ -42,13 +42,13 @@ pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
     difference(&format!("observations.{KEY}"), first, second)
 }
 
-/// The first key of a section, which need not be there, in which two resolved configs do not ask for the same model,
-/// whatever the values of the parameters that may be free.
+/// The first key of a section, which need not be there, in which two resolved configs differ in their model, ignoring
+/// values of parameters that may be free.
 pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<Difference> {
     let without_parameters = |resolved: &Value| {
         let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);
         if let Some(map) = section.as_object_mut() {
-            // a landscape has unresolved spots as the entropy has them, whatever the chain does
+            // a likelihood grid treats unresolved spots by the entropy, whatever the chain does
             let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_optional());
             map.retain(|key, _| !free(key) && key != "unresolved_spots" && key != "mass_msun" && key != "name");
         }
@@ -70,7 +70,7 @@ fn difference(key: &str, first: &Value, second: &Value) -> Option<Difference> {
     })
 }
 
-/// A value for a message: numbers and words whole, lists and sections by what they are.
+/// A value for a message: numbers and words in full, lists and sections by their type.
 fn brief(value: &Value) -> String {
     match value {
         Value::Null => "absent".into(),
@@ -89,12 +89,12 @@ fn decisive(resolved: &Value) -> Value {
         top.remove("plan");
         if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
             star.remove("name");
-            // two planets are stable by the mass or not
+            // stability of two planets depends on the mass
             if !has_second_planet(resolved) {
                 star.remove("mass_msun");
             }
         }
-        // what it gives stands beside it
+        // the values it gives are stored beside it
         if let Some(instrument) = top.get_mut("instrument").and_then(Value::as_object_mut) {
             instrument.remove("name");
         }

@@ -7,7 +7,7 @@
 /// A spectrograph.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spectrograph {
-    /// Name, as its papers write it.
+    /// Name as in its papers.
     pub name: &'static str,
     /// Resolving power: wavelength over the full width at half maximum of the instrumental profile.
     pub resolving_power: f64,
@@ -57,14 +57,14 @@ impl Spectrograph {
         SPECTROGRAPHS.iter().find(|spectrograph| plain(spectrograph.name) == plain(name))
     }
 
-    /// What to say of a name that is not known: the known ones.
+    /// The error on an unknown name, which lists the known ones.
     pub fn unknown(name: &str) -> String {
         let known: Vec<&str> = SPECTROGRAPHS.iter().map(|spectrograph| spectrograph.name).collect();
         format!("{name:?} is none of {}", known.join(", "))
     }
 }
 
-/// A name as it is compared: lower case, without blanks, hyphens and underscores.
+/// A name normalised for comparison: lower case, without blanks, hyphens and underscores.
 fn plain(name: &str) -> String {
     name.chars().filter(|c| !c.is_whitespace() && !"-_".contains(*c)).flat_map(char::to_lowercase).collect()
 }
@@ -73,7 +73,7 @@ fn plain(name: &str) -> String {
 mod tests {
     use super::{SPECTROGRAPHS, Spectrograph};
 
-    /// Every row is in the range of such spectrographs, and found by its name alone.
+    /// Every row has plausible values and is found by its name only.
     #[test]
     fn every_row_is_sane() {
         for row in &SPECTROGRAPHS {

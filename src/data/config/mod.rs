@@ -1,10 +1,10 @@
 //! The config: JSON as users write it, or a [`Config`] built in code -> checked, resolved [`Settings`]; and its JSON
 //! Schema.
 //!
-//! A [`Config`] is a `document` of keys. `written` has a type for each section, with its keys, their defaults and what
-//! the schema says of them; `settings` has, in a file of the same name, the checks and what programs use. Defaults that
-//! belong to an algorithm stand beside it. Unknown keys are refused, and every error names the file and the key.
-//! `instruments` has the spectrographs that a config may name.
+//! A [`Config`] is a `document` of keys. `written` has a type for each section, with its keys, their defaults and their
+//! descriptions in the schema; `settings` has, in a file of the same name, the checks and the values that programs use.
+//! Defaults of an algorithm are defined beside it. Unknown keys are refused, and every error names the file and the
+//! key. `instruments` has the spectrographs that a config may name.
 
 mod document;
 mod draft;

@@ -1,4 +1,4 @@
-//! One thing about a star or its profiles that may be wrong, put otherwise.
+//! A change of one property of a star or its profiles that may be wrong.
 
 use super::Reason;
 use crate::data::calibrated;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Factors on vsini, the width of the local line and the rotation period.
 const VSINI: [f64; 8] = [0.7, 0.8, 0.9, 0.97, 1.03, 1.1, 1.25, 1.4];
 const LINE_WIDTH: [f64; 5] = [0.35, 0.5, 0.7, 1.4, 2.0];
-/// Lorentzian width over the width of the local line, and what is left of the Gaussian one beside it.
+/// Lorentzian width over the width of the local line, and the remaining Gaussian width over it.
 const WINGS: [(f64, f64); 3] = [(0.3, 0.85), (0.6, 0.7), (1.0, 0.5)];
 const PERIOD: [f64; 6] = [0.5, 0.9, 0.95, 1.05, 1.1, 2.0];
 
@@ -24,14 +24,14 @@ const OFFSET: f64 = 0.03;
 /// The line ends that many standard deviations of the local line beyond vsini.
 const REACH_SIGMAS: f64 = 3.0;
 
-/// Settings with the observations that they are held against.
+/// Settings with the observations that they are compared with.
 #[derive(Clone)]
 pub(super) struct Patient {
     pub settings: Settings,
     pub observations: Observations,
-    /// The profiles in their whole width.
+    /// The profiles over their full width.
     pub whole: Arc<Observations>,
-    /// The seasons that have maps of their own.
+    /// The seasons, each with its own map.
     pub seasons: Vec<Season>,
     pub correlated_bins: f64,
 }
@@ -41,13 +41,13 @@ pub(super) struct Patient {
 pub(super) enum Change {
     /// vsini times this.
     Vsini(f64),
-    /// The local line this many times as wide, as the spectrograph shows it.
+    /// The local line this many times as wide, as observed through the spectrograph.
     LineWidth(f64),
     /// A Lorentzian of the first, and a Gaussian of the second, times the width of the local line.
     Wings(f64, f64),
     /// The rotation period times this.
     Period(f64),
-    /// The equivalent width that the profiles have.
+    /// The equivalent width measured on the profiles.
     MeasuredStrength,
     /// The continuum at this level.
     Level(f64),
@@ -62,14 +62,14 @@ pub(super) enum Change {
 }
 
 impl Patient {
-    /// What these observations, at the patient's times, are imaged with.
+    /// The imager of these observations at the subject's times.
     pub fn imager(&self, observations: Observations) -> Result<Imager, ConfigError> {
         calibrated::imager(&self.settings, &self.settings.sets, &[observations], &self.seasons)
     }
 }
 
 impl Change {
-    /// All that may be tried first.
+    /// All first-round changes.
     pub fn all(patient: &Patient) -> Vec<Change> {
         let Patient { settings, .. } = patient;
         let mut all: Vec<Change> = VSINI.map(Change::Vsini).into();
@@ -93,7 +93,7 @@ impl Change {
         all
     }
 
-    /// What it changes.
+    /// The property it changes.
     pub fn reason(&self) -> Reason {
         match self {
             Change::Vsini(_) => Reason::Vsini,
@@ -107,7 +107,7 @@ impl Change {
         }
     }
 
-    /// That in words.
+    /// The property in words.
     pub fn name(&self) -> &'static str {
         match self.reason() {
             Reason::Vsini => "vsini",
@@ -123,7 +123,7 @@ impl Change {
         }
     }
 
-    /// The change in words, with the keys that make it.
+    /// The change in words, with the keys to set.
     pub fn words(&self, patient: &Patient) -> String {
         let settings = &patient.settings;
         let Settings { values, star, .. } = settings;
@@ -166,7 +166,7 @@ impl Change {
         }
     }
 
-    /// The patient with it; `None` where that makes no sense.
+    /// The subject with the change; `None` where that is invalid.
     pub fn applied(&self, patient: &Patient) -> Option<Patient> {
         let mut changed = patient.clone();
         let settings = &mut changed.settings;
@@ -211,7 +211,7 @@ impl Change {
             _ => return Vec::new(),
         };
         let others = tried.iter().filter(|other| other.reason() == self.reason()).filter_map(Change::factor);
-        // unchanged is one of the places that were tried
+        // the unchanged value is one of those tried
         let others: Vec<f64> = others.chain([1.0]).collect();
         let below = others.iter().copied().filter(|x| *x < at).reduce(f64::max);
         let above = others.iter().copied().filter(|x| *x > at).reduce(f64::min);
@@ -240,13 +240,13 @@ fn local_sigma(patient: &Patient) -> f64 {
     (100.0 * sigma).round() / 100.0
 }
 
-/// Centre of the line and how far it reaches (km/s).
+/// Centre and half width of the line (km/s).
 fn line(patient: &Patient) -> (f64, f64) {
     let Settings { values, star, .. } = &patient.settings;
     (values[Parameter::Vsys], values[Parameter::Vsini] + REACH_SIGMAS * star.line.sigma_kms)
 }
 
-/// Level of the continuum on both sides of the line, where it is another one than 1.
+/// Level of the continuum on both sides of the line, where it differs from 1.
 fn level(patient: &Patient) -> Option<f64> {
     const FEWEST: usize = 2;
     const OFF: f64 = 1e-3;
@@ -265,7 +265,7 @@ fn level(patient: &Patient) -> Option<f64> {
     (level > 0.0 && (level - 1.0).abs() > OFF).then_some(level)
 }
 
-/// The range that holds the whole line, where that used is narrower, or wider by more than half as much.
+/// The range that contains the whole line, where the one used is narrower, or wider by more than half as much.
 fn range(patient: &Patient) -> Option<(f64, f64)> {
     const WIDE: f64 = 1.5;
     let (centre, reach) = line(patient);
@@ -280,7 +280,7 @@ fn range(patient: &Patient) -> Option<(f64, f64)> {
     (narrow || wide).then_some((centre - reach, centre + reach))
 }
 
-/// The observations within other velocities, errors scaled as those that are used.
+/// The observations within another velocity range, uncertainties scaled like those in use.
 fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
     const FEWEST: usize = 5;
     let step = patient.observations.step_kms();

@@ -1,13 +1,12 @@
-//! Numbers as people write them: few digits, of which all are meant.
+//! Rounded numbers with few significant digits.
 
-/// Rounded to so many decimals.
+/// Rounded to this many decimals.
 pub(super) fn rounded(value: f64, decimals: usize) -> f64 {
-    // what is formatted as a number is one
+    // a formatted number parses
     format!("{value:.decimals$}").parse().unwrap_or(value)
 }
 
-/// Two digits of a positive number, the last by `round`; what is off by the rounding of a double is not rounded up or
-/// down.
+/// Two digits of a positive number, the last by `round`; a deviation by double rounding is not rounded up or down.
 pub(super) fn significant(value: f64, round: impl Fn(f64) -> f64) -> f64 {
     let exponent = value.log10().floor() as i32 - 1;
     let digits = round(rounded(value / 10f64.powi(exponent), 9));

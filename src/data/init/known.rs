@@ -1,20 +1,21 @@
-//! What is known of a star without its profiles.
+//! Properties of a star known independently of its profiles.
 
 use crate::data::config::EquivalentWidth;
 use crate::numerics::units::gaussian_as_wide_as_voigt;
 use crate::star::BrightnessModel;
 use crate::surface::ObjectiveKind;
 
-/// A value with who gave it: an option, or a line of a file.
+/// A value with its source: an option, or a line of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Given<T> {
     /// The value.
     pub value: T,
-    /// Who gave it, for the table.
+    /// Its source, for the table.
     pub by: String,
 }
 
-/// What is known of the star without its profiles; all of it may be absent. Names and units are those of the config.
+/// Properties of the star known independently of its profiles; all may be absent. Names and units are those of the
+/// config.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
 pub struct Known {
@@ -39,8 +40,8 @@ pub struct Known {
     pub instrument_name: Option<Given<&'static str>>,
     pub resolving_power: Option<Given<f64>>,
     pub velocity_range_kms: Option<Given<(f64, f64)>>,
-    /// Whether nothing beyond that range is looked at, as an option asks for it; the range of another program's file is
-    /// that of its map.
+    /// Whether nothing beyond that range is used, as an option requests; the range in another program's file applies to
+    /// its map only.
     pub only_within_range: bool,
     pub sigma_scale: Option<Given<f64>>,
     pub objective: Option<Given<ObjectiveKind>>,
@@ -55,7 +56,7 @@ impl Known {
         self.velocity_range_kms.as_ref().map(|given| given.value)
     }
 
-    /// What reconstructions are judged by: what is right for most stars, if nothing else is given.
+    /// The objective of reconstructions; by default the one that suits most stars.
     pub fn objective(&self) -> ObjectiveKind {
         self.objective.as_ref().map_or(ObjectiveKind::MarginalLikelihood, |given| given.value)
     }

@@ -2,16 +2,16 @@
 
 use super::known::Given;
 
-/// Where a value came from.
+/// The source of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The profiles.
     Data,
     /// The user, or the file that is imported.
     Given,
-    /// Nobody: to be checked.
+    /// Assumed: to be checked.
     Assumed,
-    /// Nobody, and nothing can be assumed: to be filled in.
+    /// Unknown and without a default: to be filled in.
     Missing,
 }
 
@@ -37,14 +37,14 @@ pub struct Entry {
     pub value: String,
     /// Its unit; empty for none.
     pub unit: &'static str,
-    /// Where it came from.
+    /// Its source.
     pub source: Source,
-    /// How good it is, or how to give another.
+    /// Its quality, or how to change it.
     pub remark: String,
 }
 
 impl Entry {
-    /// Where its section stands in a config.
+    /// The order of its section in a config.
     pub(super) fn section(&self) -> usize {
         const SECTIONS: [&str; 7] =
             ["star", "instrument", "planet", "observations", "photometry", "imaging", "parameters"];
@@ -86,7 +86,7 @@ impl Ledger {
         value
     }
 
-    /// Takes over what `other` says of the data set `s`, of several.
+    /// Copies the entries of `other` on data set `s`, of several.
     pub fn take_set(&mut self, other: &Ledger, s: usize) {
         let own = |entry: &Entry| {
             let key = of_set(&entry.key, s)?;
@@ -95,7 +95,7 @@ impl Ledger {
         self.entries.extend(other.entries.iter().filter_map(own));
     }
 
-    /// The same of the first data set, and all that it says of the star.
+    /// The same for the first data set, with all its entries on the star.
     pub fn take_first(&mut self, other: Ledger) {
         let own = |entry: Entry| Entry {
             key: of_set(&entry.key, 0).filter(|_| entry.key != INSTRUMENT).unwrap_or(entry.key),
@@ -117,7 +117,7 @@ impl Ledger {
 /// The key of the resolving power, which is that of the first data set.
 const INSTRUMENT: &str = "instrument.resolving_power";
 
-/// A key of the config as that of data set `s` of several; `None` of what all have in common.
+/// A key of the config as that of data set `s` of several; `None` for common keys.
 fn of_set(key: &str, s: usize) -> Option<String> {
     let own = match key {
         INSTRUMENT => "resolving_power",
@@ -127,7 +127,7 @@ fn of_set(key: &str, s: usize) -> Option<String> {
     (is_own && own != "velocity_jitter_kms").then(|| format!("observations[{s}].{own}"))
 }
 
-/// Whether a value was given, or where it came from otherwise.
+/// The given source of a value, or its source otherwise.
 pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
     match given {
         Some(given) => (Source::Given, given.by.clone()),

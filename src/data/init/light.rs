@@ -1,10 +1,10 @@
-//! Light curves beside the profiles, as sections of a config.
+//! Light curves as sections of a config.
 
 use super::ledger::{Ledger, Source};
 use crate::data::config::{OutlierTreatment, PhotometrySection, SEGMENT_GAP_D};
 use std::path::PathBuf;
 
-/// Spacecraft by what names of files have in them, and the wavelength (nm) of their band.
+/// Spacecraft by parts of file names, and the wavelength (nm) of their band.
 const BANDS: [(&str, f64); 3] = [("tess", 790.0), ("kepler", 640.0), ("k2", 640.0)];
 
 /// A light curve.
@@ -35,14 +35,14 @@ impl LightCurve {
         }
     }
 
-    /// Wavelength of its band: given, or that of the spacecraft that its name has.
+    /// Wavelength of its band: given, or that of the spacecraft in its name.
     fn band(&self) -> Option<f64> {
         let name = self.name.to_lowercase();
         let by_name = || BANDS.into_iter().find(|(of, _)| name.contains(of)).map(|(_, wavelength_nm)| wavelength_nm);
         self.wavelength_nm.or_else(by_name)
     }
 
-    /// It with the reason for its band.
+    /// The light curve with the reason for its band.
     pub(super) fn note(&self, ledger: &mut Ledger) {
         const KEY: &str = "photometry.wavelength_nm";
         const OPTION: &str = "--photometry-wavelength";

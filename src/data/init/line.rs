@@ -1,25 +1,24 @@
-//! What a first look says of line and continuum, as values of a config: where the continuum is, how wide the local line
-//! is, and which velocities hold it with some continuum on both sides.
+//! Line and continuum from a first look, as values of a config: the level of the continuum, the width of the local
+//! line, and the velocity range of the line with some continuum on both sides.
 
 use super::digits::rounded;
 use super::known::Known;
 use super::ledger::{Ledger, Source, origin};
 use crate::surface::calibration::first_look::{FirstLook, LineModel};
 
-/// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the
-/// continuum on either side.
+/// The velocity range includes this many bins, and this many observed line widths, of the continuum on either side.
 const CONTINUUM: (f64, f64) = (6.0, 2.0);
 
 /// A line width is poorly determined where its error is more than this share of it.
 const POORLY: f64 = 0.25;
 
-/// Where the continuum is, where it is not at 1.
+/// The level of the continuum, where it is not 1.
 pub(super) fn note_continuum(level: f64, error: f64, ledger: &mut Ledger) {
     let remark = format!("level of the continuum beside the line, ± {error:.0e}: profiles are divided by it");
     ledger.note("observations.continuum_level", level, "", Source::Data, remark);
 }
 
-/// Width of the local line: given, or as the flanks of the mean profile have it.
+/// Width of the local line: given, or from the flanks of the mean profile.
 pub(super) fn sigma_kms(look: &FirstLook, line: LineModel, known: &Known, ledger: &mut Ledger) -> f64 {
     let (sigma, error) = (look.unspotted.line_sigma_kms, look.line_sigma_error_kms.unwrap_or(0.0));
     let (source, remark) = match error > POORLY * sigma {
@@ -35,7 +34,7 @@ pub(super) fn sigma_kms(look: &FirstLook, line: LineModel, known: &Known, ledger
     ledger.settle(("star.line.sigma_kms", "km/s"), &known.line_sigma_kms, (rounded(sigma, 1), source, remark.as_str()))
 }
 
-/// The line with some continuum on both sides, as far as the profiles have it.
+/// The line with some continuum on both sides, as far as the profiles reach.
 pub(super) fn velocity_range(
     look: &FirstLook,
     line: LineModel,

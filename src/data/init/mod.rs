@@ -1,9 +1,8 @@
-//! A first config for observed profiles: what they say themselves, what is given, and what has to be assumed; each
-//! value with where it came from.
+//! A first config for observed profiles: measured, given, and assumed values, each with its source.
 //!
-//! It is a config that `map`, `periodogram` and `sample` take as it is, and that is tried out, by maps of the objective
-//! that it names. Where there are none, what is likely to be wrong is found by trying (`diagnosis`), and no config is
-//! made. Of several lists each is a data set: the star is what they all say, and the first has no velocity offset.
+//! The config is accepted by `map`, `periodogram` and `sample` without changes, and is tested by maps of its objective.
+//! Where no map fits, the likely fault is found by tests (`diagnosis`), and no config is made. Each of several lists is
+//! a data set: they share the star, and the first has no RV offset.
 
 mod digits;
 mod known;
@@ -28,7 +27,7 @@ use ledger::Ledger;
 use proposal::to_json;
 use values::{Values, variances};
 
-/// A list of profiles and what it says.
+/// A list of profiles with its measurements.
 struct Set {
     profiles: ProfileSet,
     whole: Observations,
@@ -38,12 +37,12 @@ struct Set {
     cut: Observations,
 }
 
-/// The proposal for the profiles of some lists, of a star of which something is known. What looks wrong is said at once
-/// by `say`, before anything is tried out.
+/// The proposal for the profiles of some lists, given known properties of the star. Suspicious values are reported by
+/// `say` at once, before any test.
 ///
 /// # Errors
-/// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say;
-/// profiles of which the config would make no maps, with the likely reason.
+/// Profiles that cannot be read or show no line, given values that are invalid or inconsistent with the profiles;
+/// profiles that maps of the config do not fit, with the likely reason.
 pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Proposal, ProposalError> {
     let mut sets = place.lists.iter().map(|list| measured(list, known)).collect::<Result<Vec<Set>, _>>()?;
     let (first, others) = sets.split_at_mut(1);
@@ -79,7 +78,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
         let of = list.name.as_ref().filter(|_| several).map_or_else(String::new, |name| format!("{name}: "));
         notes.extend(set.profiles.remarks.iter().map(|remark| format!("profiles: {of}{remark}")));
         let Some(text) = variances(&set.whole, &set.values.look.noise) else { continue };
-        // by the continuum they are scaled; without it maps would follow the noise, for ages
+        // the continuum scales them; without it maps would fit the noise, very slowly
         if set.values.look.noise.ratio().is_none() && known.sigma_scale.is_none() {
             return Err(ProposalError::Variances { list: list.list.into(), text });
         }
@@ -130,7 +129,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     })
 }
 
-/// The profiles of a list, and what they say.
+/// The profiles of a list, with measurements.
 fn measured(list: &List, known: &Known) -> Result<Set, ProposalError> {
     let known = &Known {
         resolving_power: list.resolving_power.clone().or_else(|| known.resolving_power.clone()),

@@ -1,4 +1,4 @@
-//! A first config with where its values came from, and the table of them.
+//! A first config with the sources of its values, and their table.
 
 use super::known::Given;
 use super::ledger::{Entry, Source};
@@ -9,7 +9,7 @@ use crate::numerics::text::{Align, columns};
 use crate::surface::calibration::first_look::LookError;
 use std::path::{Path, PathBuf};
 
-/// Where things are or will be.
+/// Paths of inputs and outputs.
 #[derive(Clone, Debug)]
 pub struct Place<'a> {
     /// The config that will be written.
@@ -35,38 +35,38 @@ pub struct List<'a> {
     pub list_in_config: PathBuf,
     /// Its name, where it is one of several.
     pub name: Option<String>,
-    /// Resolving power of its spectrograph, where it has one of its own.
+    /// Resolving power of its spectrograph, where it differs from that of the first.
     pub resolving_power: Option<Given<f64>>,
-    /// Wavelength (nm) of its profiles, where it has one of its own.
+    /// Wavelength (nm) of its profiles, where it differs from that of the first.
     pub wavelength_nm: Option<Given<f64>>,
 }
 
 impl Place<'_> {
-    /// The list that is named where something is wrong with all.
+    /// The list to name in errors that concern all.
     pub(super) fn first_list(&self) -> &Path {
         self.lists[0].list
     }
 }
 
-/// A config and where its values came from.
+/// A config and the sources of its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposal {
     /// The config, as text.
     pub json: String,
     /// What was observed, in a line.
     pub observed: String,
-    /// Every value that is worth a look, with its source.
+    /// All relevant values with their sources.
     pub entries: Vec<Entry>,
-    /// What became of the trial, and what looks wrong.
+    /// The result of the test, and suspicious values.
     pub notes: Vec<String>,
-    /// Whether a map can be made of the config as it is.
+    /// Whether a map can be made from the config without changes.
     pub complete: bool,
 }
 
 /// Why there is no proposal: one line that names the file at fault.
 #[derive(Debug, thiserror::Error)]
 pub enum ProposalError {
-    /// The list or a profile, or a given value that makes no sense.
+    /// The list or a profile, or a given value that is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The profiles show no star.
@@ -77,14 +77,14 @@ pub enum ProposalError {
         /// What is wrong with them.
         error: LookError,
     },
-    /// The model is nowhere near the profiles.
+    /// The model is inconsistent with the profiles.
     #[error("{}: no map fits unless the errors are {factor:.1} times as large: {reason}", .list.display())]
     OutOfReach {
         /// The list of profiles.
         list: PathBuf,
-        /// Factor on the errors of the continuum at which a map would fit.
+        /// Factor on the uncertainties from the continuum at which a map would fit.
         factor: f64,
-        /// The likely reason, by trying.
+        /// The likely reason, from tests.
         reason: String,
     },
     /// Uncertainties that are variances, and no continuum to scale them by.
@@ -92,7 +92,7 @@ pub enum ProposalError {
     Variances {
         /// The list of profiles.
         list: PathBuf,
-        /// What they are.
+        /// Their description.
         text: String,
     },
     /// No map can be made of the profiles with these values.

@@ -1,6 +1,6 @@
-//! Tries a draft out as `map` would: by the maps of its objective, on few pixels and few profiles for the sake of time;
-//! and what is likely to be wrong if there are none. Of a static map it is whether it reaches its target chi2 with
-//! uncertainties as the continuum has them, without a planet or with the best orbit that a search finds.
+//! Tests a draft as `map` would: by the maps of its objective, with few pixels and profiles to save time; and the
+//! likely fault if there are none. A static map is tested for reaching its target chi2 with uncertainties from the
+//! continuum, without a planet or with the best orbit of a search.
 
 use super::digits::rounded;
 use super::known::Known;
@@ -19,93 +19,92 @@ use crate::surface::{FittedIndicator, NoMaps, OtherRotation, ReferenceError, Sur
 use std::path::Path;
 use std::sync::Arc;
 
-/// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
+/// Placeholder (d) for a rotation period that is still to be given, so that everything else is checked.
 const STAND_IN_D: f64 = 1.0;
 
-/// Pixels, and so many profiles of each data set at least, with which evolving maps are tried.
+/// Pixels, and least number of profiles per data set, for the test of evolving maps.
 const PIXELS: usize = 500;
 const PROFILES: usize = 12;
 
-/// Evolving maps that leave a larger chi2 per datum than this do not fit.
+/// Evolving maps with a larger chi2 per datum do not fit.
 const POOR: f64 = 1.5;
 
-/// A vsini is a better one where ln Z is higher by more than this.
+/// A vsini is better if ln Z is higher by more than this.
 const BETTER: f64 = 10.0;
 
-/// Errors that a map needs may be larger by this than those that it is hoped to do with.
+/// Tolerated ratio of the uncertainties that a map needs to those aimed at.
 const AS_GOOD: f64 = 0.8;
 
-/// Where errors have to be larger than those of the continuum by more than this, and nothing that is tried helps, they
-/// are not at fault: the model is.
+/// If uncertainties must exceed those of the continuum by more than this, and no tested change helps, the model is at
+/// fault.
 const MOST_MISFIT: f64 = 5.0;
 
-/// More of a star is hardly ever spotted in a maximum-entropy map.
+/// Maximum-entropy maps hardly ever have a larger spot coverage.
 const MANY_SPOTS: f64 = 0.25;
 
-/// What became of it.
+/// The result of the test.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Trial {
     /// How it ended.
     pub end: End,
-    /// What the profiles of each data set say of their errors, where that is left to them.
+    /// Measured uncertainties of each data set, where left to the profiles.
     pub errors: Vec<Option<MeasuredErrors>>,
-    /// Why no map fits as well as the errors promise, if none does.
+    /// Why no map fits within the uncertainties, if none does.
     pub diagnosis: Option<Diagnosis>,
     /// Whether the start is an orbit, since there is no fit without one.
     pub orbit: bool,
-    /// Whether the measured vsini stands in place of the given one, with which nothing fits.
+    /// Whether the measured vsini replaces the given one, with which nothing fits.
     pub measured_vsini: bool,
-    /// What was fitted of the star, and what it gains.
+    /// Fitted properties of the star, and the gain in ln Z.
     pub star: Option<String>,
-    /// What activity indicators have to do with the spots.
+    /// Relation of activity indicators to the spots.
     pub indicators: Vec<String>,
-    /// What has to be known of the maps.
+    /// Remarks on the maps.
     pub warnings: Vec<String>,
 }
 
 /// How it ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum End {
-    /// It was not tried: there is no rotation period.
+    /// It was not tested: there is no rotation period.
     Untried,
-    /// There are maps: what they are, in words.
+    /// There are maps, described in words.
     Fits(String),
 }
 
-/// The key of the velocity zero points.
+/// The key of the RV jitter.
 const JITTER: &str = "observations.velocity_jitter_kms";
 
-/// One draft, tried.
+/// One tested draft.
 struct Attempt {
-    /// The draft with its profiles; `None` where their errors cannot be measured.
+    /// The draft with its profiles; `None` where their uncertainties cannot be measured.
     scene: Option<Scene>,
     reached: Result<f64, String>,
-    /// Whether errors are larger than those of the continuum, or than those given would have to be, because no map
-    /// fits.
+    /// Whether, for a map to fit, uncertainties must be larger than those of the continuum, or than the given ones.
     misfits: bool,
-    /// By how much; 1 where they do not.
+    /// By which factor; 1 otherwise.
     misfit: f64,
 }
 
-/// What a draft is tried on.
+/// Inputs of the test of a draft.
 #[derive(Clone, Copy)]
 pub(super) struct Observed<'a> {
     /// Where the config goes, and its lists.
     pub place: &'a Place<'a>,
     /// The profiles of each list.
     pub profiles: &'a [ProfileSet],
-    /// What those of the first say.
+    /// Measurements on those of the first.
     pub values: &'a Values,
-    /// What is known without them.
+    /// Properties known independently of them.
     pub known: &'a Known,
 }
 
-/// Tries `draft` on its profiles, a set for each list. Changes vsini where the given one is far from that of the
-/// profiles and no map fits with it; of a static map the draft's start, too, where only an orbit makes a map fit. No
+/// Tests `draft` on its profiles, a set for each list. Changes vsini where the given one is far from that of the
+/// profiles and no map fits with it; with a static map also the draft's start, where only an orbit makes a map fit. No
 /// orbit is searched for with such a vsini.
 ///
 /// # Errors
-/// Given values that make no sense; a model that has no maps of these profiles, with the likely reason.
+/// Given values that are invalid; a model whose maps do not fit these profiles, with the likely reason.
 pub(super) fn run(draft: &mut Draft, observed: Observed) -> Result<Trial, ProposalError> {
     let Observed { place, profiles, known, .. } = observed;
     if draft.star.rotation_period_d.is_none() {
@@ -122,10 +121,10 @@ pub(super) fn run(draft: &mut Draft, observed: Observed) -> Result<Trial, Propos
     }
 }
 
-/// The trial of maps that evolve.
+/// The test of evolving maps.
 fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Observed) -> Result<Trial, ProposalError> {
     let few: Vec<ProfileSet> = profiles.iter().map(|set| share(set, PROFILES)).collect();
-    // what is wrong with the draft itself is said of itself
+    // errors of the draft itself are reported by themselves
     config::from_json(to_json(draft, place.config)?.as_bytes(), place.config).map_err(SceneError::from)?;
     let tried = |draft: &Draft| -> Result<(Scene, Result<SurfaceMaps, NoMaps>), ProposalError> {
         let mut coarse = draft.clone();
@@ -160,12 +159,12 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
     if poor || stands_in || field.is_some_and(|field| field.at_bounds.iter().any(is_bound)) {
         trial.diagnosis = Diagnosis::of(&scene).filter(|diagnosis| poor || diagnosis.reason != Reason::Errors);
     } else if field.and_then(|f| f.spot_lifetime_d).is_some_and(|d| d < scene.imager.star.rotation_period_d) {
-        // spots that do not live for a rotation fit anything, a second star included
+        // spots that live for less than a rotation fit anything, a second star included
         trial.diagnosis = Diagnosis::at_sight(&scene).filter(|seen| seen.reason == Reason::DoubleLines);
     }
     trial.star = scene.measured.star.as_ref().map(MeasuredStar::line);
     trial.indicators = scene.measured.indicators.iter().map(FittedIndicator::line).collect();
-    // a second star makes another rotation period look better
+    // a second star biases the rotation period
     let is_double = trial.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.reason == Reason::DoubleLines);
     let rotation = scene.measured.other_rotation.as_ref().filter(|_| is_double).map(OtherRotation::sentence);
     let warnings = maps.warnings.iter().chain(&maps.checks.warnings);
@@ -179,8 +178,13 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
         format!(" (spot amplitude {:.2}{lifetime})", field.spot_amplitude)
     });
     let chi2 = maps.summary.chi2_per_datum;
+<<<<<<< HEAD
     trial.end = End::Fits(format!("evolving maps fit {of} profiles with χ²/N = {chi2:.2}{spots}"));
     // errors of one data set are those of all its profiles; a scene of several takes a fit
+=======
+    trial.end = End::Fits(format!("evolving maps fit {of} profiles with chi2 = {chi2:.2} per datum{spots}"));
+    // uncertainties of one data set use all its profiles; several data sets require a fit
+>>>>>>> words
     trial.errors = match profiles {
         [_] => vec![self::scene(draft, place.config, profiles)?.measured.errors],
         _ => scene.measured.sets.iter().map(|set| set.errors.clone()).collect(),
@@ -203,14 +207,14 @@ fn share(set: &ProfileSet, least: usize) -> ProfileSet {
     few
 }
 
-/// That there are no maps, and why, as `map` would say it.
+/// The error where there are no maps, worded as by `map`.
 fn no_maps(place: &Place, diagnosis: Option<Diagnosis>, error: &NoMaps) -> ProposalError {
     let status = error.status().map_or_else(String::new, |status| format!(" ({status})"));
     let reason = diagnosis.map_or_else(|| error.to_string(), |diagnosis| diagnosis.text);
     ProposalError::NoMaps { list: place.first_list().into(), status, reason }
 }
 
-/// The trial of static maps.
+/// The test of static maps.
 fn unchanging(
     draft: &mut Draft,
     Observed { place, profiles, values, known }: Observed,
@@ -218,7 +222,7 @@ fn unchanging(
     let config = place.config;
     let mut trial = Trial::of(End::Untried);
     let mut attempt = match attempt_of(draft, config, profiles) {
-        // few profiles do not tell how much their zero points scatter
+        // few profiles do not constrain their RV jitter
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, .. }))) if key == JITTER => {
             *draft = draft.clone().with_jitter(VelocityJitter::default());
             attempt_of(draft, config, profiles)?
@@ -234,7 +238,7 @@ fn unchanging(
         }
     }
     let is_this_star = trial.measured_vsini || !values.is_another_star(known);
-    // neither a second star nor variances are a planet's
+    // neither a second star nor variances indicate a planet
     let seen = attempt.scene.as_ref().filter(|_| attempt.misfits).and_then(Diagnosis::at_sight);
     if attempt.misfits && is_this_star && seen.is_none() {
         let mut with_orbit = draft.clone();
@@ -278,7 +282,7 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &[ProfileSet]) -> Result<A
     let jitter = draft.observations.sections.iter().any(|set| set.velocity_jitter_kms == fitted);
     let scene = match scene(draft, config, profiles) {
         Ok(scene) => scene,
-        // what is measured, not what is given
+        // the measured value, not the given one
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })))
             if key == "observations.sigma_scale" || key == JITTER && !jitter =>
         {
@@ -304,8 +308,8 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &[ProfileSet]) -> Result<A
     })
 }
 
-/// Puts the best orbit and systemic velocity into the draft, searched for with errors as the continuum has them;
-/// whether there are any.
+/// Puts the best orbit and systemic velocity into the draft, searched for with uncertainties from the continuum;
+/// returns whether there are any.
 fn search(
     draft: &mut Draft,
     config: &Path,
@@ -322,7 +326,7 @@ fn search(
     let scene = scene(&with_its_errors, config, profiles)?;
     let found = match scene.optimise() {
         Ok(found) => found,
-        // what matters is that there is no map
+        // the only relevant point is that there is no map
         Err(SearchError::Reference(_) | SearchError::Optimise(_) | SearchError::Field(_)) => return Ok(false),
     };
     let best = scene.space.values_at(&found.optimum.theta);
@@ -367,12 +371,12 @@ impl Trial {
         }
     }
 
-    /// Whether a map can be made of the config as it is.
+    /// Whether a map can be made from the config without changes.
     pub fn is_complete(&self) -> bool {
         matches!(self.end, End::Fits(_))
     }
 
-    /// It in words.
+    /// The result in words.
     pub fn notes(&self, draft: &Draft) -> Vec<String> {
         let vsini = self.measured_vsini.then(|| {
             format!(

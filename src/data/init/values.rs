@@ -18,9 +18,9 @@ use crate::surface::calibration::noise;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::nuisances::LineAndContinuum;
 
-/// What is assumed where nobody says otherwise.
+/// Default assumptions.
 mod assumed {
-    /// Inclination (degrees): half of all stars are seen at less.
+    /// Inclination (degrees): the median of random orientations.
     pub const INCLINATION_DEG: f64 = 60.0;
     /// Temperatures (K) of a young K dwarf and its spots.
     pub const PHOTOSPHERE_K: f64 = 5000.0;
@@ -31,30 +31,30 @@ mod assumed {
     pub const LINE_SIGMA_KMS: f64 = 2.5;
     /// Resolving power of ESPaDOnS and NARVAL.
     pub const RESOLVING_POWER: f64 = 65_000.0;
-    /// Periods over the rotation period, where that is not known.
+    /// Periods over the rotation period, where the latter is unknown.
     pub const PORB_OVER_PROT: (f64, f64) = (0.5, 5.0);
 }
 
-/// The prior of the systemic velocity reaches that many errors, and this far (km/s) at least.
+/// The prior of the systemic velocity reaches this many standard errors, and at least this far (km/s).
 const VSYS_REACH: (f64, f64) = (6.0, 0.5);
 
-/// Given and measured vsini that differ by more than that many errors are worth a note.
+/// A difference of given and measured vsini by more than this many standard errors is reported.
 const DISAGREEMENT: f64 = 3.0;
 
-/// By more than that many, no orbit makes up for it.
+/// Beyond this many, no orbit can compensate for it.
 const ANOTHER_STAR: f64 = 5.0;
 
 /// Differential rotation of the Sun (rad/d), and the angle (rad) between equator and pole from which a map shows it.
 const SOLAR_DOMEGA_RAD_D: f64 = 0.055;
 const SHEAR_RAD: f64 = 0.2;
 
-/// A vsini below this (km/s) rounds to none.
+/// A vsini below this (km/s) rounds to 0.
 const NARROWEST_KMS: f64 = 0.05;
 
 /// Profiles that show an orbit.
 const FEWEST_FOR_AN_ORBIT: usize = 3;
 
-/// What is needed before the velocity range is cut.
+/// Inputs needed before the velocity range is cut.
 pub(super) struct Values {
     pub look: FirstLook,
     pub velocity_range_kms: (f64, f64),
@@ -66,8 +66,8 @@ pub(super) struct Values {
 }
 
 impl Values {
-    /// A look at all that was observed, and where the line is in it. Profiles whose continuum is elsewhere than at 1
-    /// are divided by its level.
+    /// A first look at all observations, with the position of the line. Profiles whose continuum is not at 1 are
+    /// divided by its level.
     pub fn measure(whole: &mut Observations, known: &Known, ledger: &mut Ledger) -> Result<Self, LookError> {
         let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
         let resolving_power = ledger.settle(
@@ -108,8 +108,8 @@ impl Values {
         Ok(Values { look, velocity_range_kms, continuum_level, line_sigma_kms, resolving_power, limb_darkening })
     }
 
-    /// What other data sets say of the star as well: vsini and local line become the means of all, weighted by their
-    /// errors, and the time base is that of all.
+    /// Combines the measurements of other data sets: vsini and local line become the means of all, weighted by their
+    /// uncertainties, and the time base is that of all.
     pub fn join(&mut self, others: &[&Values], known: &Known, ledger: &mut Ledger) {
         if others.is_empty() {
             return;
@@ -203,7 +203,7 @@ impl Values {
         Draft::new(star, instrument, beside, imaging, sought, porb_over_prot)
     }
 
-    /// The profiles as a data set; with the nuisances of its own where it is one of several.
+    /// The profiles as a data set; with its own nuisances where it is one of several.
     pub fn section(&self, known: &Known, ledger: &mut Ledger, several: bool) -> ObservationsSection {
         let sigma_scale = known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value));
         ObservationsSection {
@@ -249,7 +249,7 @@ impl Values {
         (start.clamp(min, max), (min, max))
     }
 
-    /// Levels and slopes of single continua, where these wander or are tilted by more than their noise.
+    /// Levels and slopes of single continua, where their rms exceeds the noise.
     pub fn nuisances(&self, ledger: &mut Ledger) -> Option<LineAndContinuum> {
         let continuum = self.look.continuum?;
         let mut nuisances = LineAndContinuum::default();
@@ -268,7 +268,7 @@ impl Values {
         (nuisances != LineAndContinuum::default()).then_some(nuisances)
     }
 
-    /// The factor on the errors with its reason; `measured` is what "auto" came to.
+    /// The factor on the uncertainties with its reason; `measured` is the result of "auto".
     pub fn note_errors(&self, known: &Known, measured: Option<&MeasuredErrors>, ledger: &mut Ledger) {
         let noise = &self.look.noise;
         let auto = match (measured, noise.scatter) {
@@ -292,7 +292,7 @@ impl Values {
         ledger.settle(("observations.sigma_scale", ""), &given, ("auto".to_owned(), Source::Data, &auto));
     }
 
-    /// The scatter of zero points with its reason.
+    /// The RV jitter with its reason.
     pub fn note_jitter(draft: &Draft, ledger: &mut Ledger) {
         const KEY: &str = "observations.velocity_jitter_kms";
         match draft.observations.sections[0].velocity_jitter_kms.unwrap_or_default() {
@@ -336,18 +336,18 @@ impl Values {
         )
     }
 
-    /// By how many of its errors the given vsini is off the measured one; 0 if none is given.
+    /// Difference of given and measured vsini in standard errors; 0 if none is given.
     fn disagreement(&self, known: &Known) -> f64 {
         let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
         known.vsini_kms.as_ref().map_or(0.0, |given| (given.value - measured).abs() / error)
     }
 
-    /// Whether the given vsini is so wrong that it is not worth searching for an orbit.
+    /// Whether the given vsini is so wrong that a search for an orbit is useless.
     pub fn is_another_star(&self, known: &Known) -> bool {
         self.disagreement(known) > ANOTHER_STAR
     }
 
-    /// Given values that the profiles do not agree with, and an assumed one that matters.
+    /// Given values that are inconsistent with the profiles, and important assumptions.
     pub fn notes(&self, known: &Known, profiles: usize) -> Vec<String> {
         let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
         let disagrees = self.disagreement(known) > DISAGREEMENT;
@@ -386,14 +386,14 @@ impl Values {
     }
 }
 
-/// What the profiles say of their errors if these look like variances.
+/// The remark on uncertainties that look like variances.
 pub(super) fn variances(whole: &Observations, noise: &Noise) -> Option<String> {
     let by_continuum = noise.ratio().map(|ratio| (noise.quoted, ratio));
     let (quoted, factor) = by_continuum.or_else(|| noise::by_neighbours(whole))?;
     noise::variances(quoted, factor)
 }
 
-/// Mean of values with their errors, and its error.
+/// Weighted mean of values with standard errors, and its standard error.
 fn weighted_mean(values: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     let (sum, weights) = values.fold((0.0, 0.0), |(sum, weights), (x, error)| {
         let weight = error.powi(-2);
@@ -402,8 +402,8 @@ fn weighted_mean(values: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     (sum / weights, weights.sqrt().recip())
 }
 
-/// Numbers of the star that every command fits under priors around the values here; none with static maps. Of several
-/// data sets each has an equivalent width and a limb darkening of its own.
+/// Parameters of the star that every command fits under priors around the values here; none with static maps. Each of
+/// several data sets has its own equivalent width and limb darkening.
 fn fitted(data_sets: usize, known: &Known, ledger: &mut Ledger) -> Vec<String> {
     if !known.objective().properties().has_field {
         return Vec::new();
@@ -454,7 +454,7 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
     imaging
 }
 
-/// What a reconstruction is judged by, and why.
+/// The objective of a reconstruction, with its reason.
 pub(super) fn note_objective(draft: &Draft, known: &Known, ledger: &mut Ledger) {
     let (source, remark) = match &known.objective {
         Some(given) => (Source::Given, given.by.as_str()),
@@ -463,11 +463,10 @@ pub(super) fn note_objective(draft: &Draft, known: &Known, ledger: &mut Ledger) 
     ledger.note("imaging.objective", draft.imaging.objective.name(), "", source, remark);
 }
 
-/// Upper bound of K: as far as the lines are seen to move from peak to peak, twice of what moves them if that is a
-/// planet.
+/// Upper bound of K: the peak-to-peak range of the lines' velocities, twice the K of a planet that would cause it.
 fn k_max(cuts: &[&Observations], ledger: &mut Ledger) -> f64 {
     const PHOTON_ERRORS: f64 = 5.0;
-    // those of each data set about their own mean: an offset between data sets is no orbit
+    // velocities of each data set about their mean: an offset between data sets is not an orbit
     let moments: Vec<(f64, f64)> = cuts
         .iter()
         .flat_map(|cut| {

@@ -1,8 +1,8 @@
-//! Files, sets of files and folders that are either there whole or not at all: written under hidden names, then
-//! renamed. Whatever a crash leaves under such a name is removed by the next command that writes there.
+//! Atomic writes: files, sets of files and folders that are either complete or absent, written under hidden names, then
+//! renamed. Leftovers of a crash under such a name are removed by the next command that writes there.
 //!
-//! Hidden names hold the number of the process. Numbers return, and those of another machine say nothing, so whether
-//! the writer still lives is asked of a lock that it holds.
+//! Hidden names contain the id of the writing program. Ids are reused, and those of another machine are meaningless, so
+//! a lock held by the writer shows whether it still runs.
 
 use serde::Serialize;
 use std::ffi::OsStr;
@@ -18,11 +18,11 @@ use std::time::{Duration, Instant};
 pub struct WriteError {
     /// The file.
     pub path: PathBuf,
-    /// What the system says.
+    /// The message of the system.
     pub source: std::io::Error,
 }
 
-/// File of a stage whose writer lives as long as it is locked.
+/// File of a stage that is locked as long as its writer runs.
 const LOCK: &str = "lock";
 
 /// Where the files of a stage are.
@@ -31,14 +31,14 @@ const FILES: &str = "files";
 /// Where a stage keeps what it replaces.
 const OLD: &str = "old";
 
-/// Endings of hidden names: what is being written, and a set that is whole and on its way to its place.
+/// Endings of hidden names: a set being written, and a complete set being moved to its place.
 const WRITING: &str = "tmp";
 const WHOLE: &str = "whole";
 
-/// On a file system without locks, what nobody has touched for so long is abandoned.
+/// On a file system without locks, files unmodified for this long count as abandoned.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// How long a folder is waited for, and between two tries.
+/// Longest wait for a folder, and time between two attempts.
 const LONGEST: Duration = Duration::from_secs(10);
 const PAUSE: Duration = Duration::from_millis(5);
 
@@ -57,15 +57,15 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
         file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| std::fs::rename(&temporary, path))
     });
     written.map_err(|source| {
-        // What is wrong with the file itself is what matters; that its torn half may stay does not.
+        // Report the error of the file itself, not that of removing its partial copy.
         let _ = std::fs::remove_file(&temporary);
         WriteError { path: path.into(), source }
     })
 }
 
 /// Writes a set of files into `folder`, which must exist: `fill` makes them in the folder that it is given, and files
-/// of the same names are replaced. Where `fill` fails nothing has changed; a set that a crash has stopped on its way
-/// to its place is brought there by [`clear_abandoned`].
+/// of the same names are replaced. Where `fill` fails nothing has changed; a set whose move a crash has interrupted is
+/// completed by [`clear_abandoned`].
 ///
 /// # Errors
 /// Those of `fill`, and as [`write()`].
@@ -99,7 +99,7 @@ pub fn write_folder(path: &Path, fill: &dyn Fn(&Path) -> std::io::Result<()>) ->
     fill(&new).and_then(|()| replace()).map_err(|source| WriteError { path: path.into(), source })
 }
 
-/// A folder into which no other command that writes its results in one go brings them as long as this lives.
+/// A claim on a folder: no other command that writes its results atomically moves them there while it is held.
 #[derive(Debug)]
 pub struct Claimed {
     folder: PathBuf,
@@ -115,9 +115,9 @@ impl Deref for Claimed {
 }
 
 impl Claimed {
-    /// Waits until no other command brings results into `folder`, and asks once more whether they may go there: another
-    /// process may have written there meanwhile. The claim is empty where folders cannot be locked, and where one is
-    /// locked for longer than bringing files takes.
+    /// Waits until no other command moves results into `folder`, and checks again whether they may go there, since
+    /// another process may have written there meanwhile. The claim is empty where folders cannot be locked, and where
+    /// one is locked for longer than moving files takes.
     ///
     /// # Errors
     /// Those of `check`.
@@ -141,12 +141,12 @@ fn lock(folder: &Path) -> Option<File> {
     }
 }
 
-/// Removes from `folder` what writers that live no more have left half-written, and brings whole sets to their place.
+/// Removes from `folder` partial files of writers that no longer run, and moves complete sets to their place.
 pub fn clear_abandoned(folder: &Path) {
     clear(folder, |_| true);
 }
 
-/// Writes `value` as indented JSON; what is not a finite number becomes null.
+/// Writes `value` as indented JSON; non-finite numbers become null.
 ///
 /// # Errors
 /// As [`write()`].
@@ -157,15 +157,15 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), WriteError>
     write(path, &json)
 }
 
-/// Whether this is a hidden name of something half-written.
+/// Whether this is a hidden name of a partial file.
 pub fn is_temporary(name: &OsStr) -> bool {
     hidden(name).is_some()
 }
 
-/// What stands for a name in the hidden names of stages.
+/// Encoding of a name in the hidden names of stages.
 const STAGE: &str = "dimcmc";
 
-/// A hidden folder in which files are made; it goes with what is in it.
+/// A hidden folder in which files are made; it is removed with its content.
 struct Stage {
     path: PathBuf,
     _lock: File,
@@ -196,13 +196,13 @@ impl Drop for Stage {
     }
 }
 
-/// Whether a file belongs to a stage, in which nothing is left of others.
+/// Whether a file belongs to a stage itself, with no other files left.
 fn is_staged(path: &Path) -> bool {
     let in_stage = |name: &OsStr| hidden(name).is_some_and(|(of, _)| of == STAGE);
     path.ancestors().skip(1).filter_map(Path::file_name).any(in_stage)
 }
 
-/// Brings everything in `from` to the same names in `to`; of folders, what is in them.
+/// Moves everything in `from` to the same names in `to`, folders by their content.
 fn place(from: &Path, to: &Path) -> std::io::Result<()> {
     for entry in std::fs::read_dir(from)? {
         let entry = entry?;
@@ -218,7 +218,7 @@ fn place(from: &Path, to: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Removes from `folder` what is abandoned of those whose hidden names are `of` such a name.
+/// Removes from `folder` abandoned files whose hidden names are `of` such a name.
 fn clear(folder: &Path, of: impl Fn(&OsStr) -> bool) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let (name, path) = (entry.file_name(), entry.path());
@@ -231,12 +231,12 @@ fn clear(folder: &Path, of: impl Fn(&OsStr) -> bool) {
         if ending == WHOLE && place(&path.join(FILES), folder).is_err() {
             continue;
         }
-        // what cannot be removed is no worse than before
+        // a failure to remove is harmless
         let _ = if is_folder { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
     }
 }
 
-/// Whether nobody holds the lock on a file.
+/// Whether a file is unlocked.
 fn is_abandoned(file: &Path) -> bool {
     let old = || {
         let age = file.metadata().and_then(|it| it.modified()).ok().and_then(|at| at.elapsed().ok());
@@ -248,7 +248,7 @@ fn is_abandoned(file: &Path) -> bool {
             Err(TryLockError::WouldBlock) => false,
             Err(TryLockError::Error(_)) => old(),
         },
-        // a stage that its writer had no time to lock
+        // a stage whose writer has not yet locked it
         Err(error) => error.kind() == ErrorKind::NotFound,
     }
 }
@@ -261,7 +261,7 @@ fn beside(path: &Path, of: &OsStr, ending: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Name and ending that a hidden name was made of.
+/// Name and ending from which a hidden name was made.
 fn hidden(name: &OsStr) -> Option<(&str, &str)> {
     let (rest, ending) = name.to_str()?.strip_prefix('.')?.rsplit_once('.')?;
     let (name, process) = rest.rsplit_once('.')?;
@@ -329,7 +329,7 @@ mod tests {
         std::fs::create_dir_all(at(".dimcmc.5.tmp/files")).unwrap();
         std::fs::create_dir_all(at(".dimcmc.7.whole/files")).unwrap();
         std::fs::write(at(".dimcmc.7.whole/files/b.json"), "whole").unwrap();
-        // not ours, and one whose writer lives
+        // a foreign file, and one whose writer runs
         std::fs::write(at(".mine.tmp"), "precious").unwrap();
         std::fs::write(at(".c.json.9.tmp"), "being written").unwrap();
         let living = File::open(at(".c.json.9.tmp")).unwrap();
@@ -337,7 +337,7 @@ mod tests {
         clear_abandoned(dir.path());
         assert_eq!(names(dir.path()), [".c.json.9.tmp", ".mine.tmp", "b.json"]);
         drop(living);
-        // the next writer of that file removes it, and nobody else's
+        // the next writer of that file removes it, and no other file
         std::fs::write(at(".d.json.9.tmp"), "another").unwrap();
         write(&at("c.json"), b"{}").unwrap();
         assert_eq!(names(dir.path()), [".d.json.9.tmp", ".mine.tmp", "b.json", "c.json"]);

@@ -14,7 +14,7 @@ pub struct Columns {
     path: PathBuf,
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
-    /// The line that each row stands in.
+    /// The line number of each row.
     lines: Vec<usize>,
 }
 
@@ -22,8 +22,8 @@ impl Columns {
     /// Reads a table with the names of its columns in the first line.
     ///
     /// # Errors
-    /// [`FileError`]: a file that cannot be read, a line of another length, something that is no number or beyond
-    /// sense, no row.
+    /// [`FileError`]: a file that cannot be read, a line of another length, a cell that is not a number or out of
+    /// range, no row.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
         let mut lines = text.lines();
@@ -53,7 +53,7 @@ impl Columns {
         Ok(Columns { path: path.into(), names, columns, lines: rows })
     }
 
-    /// That there are `expected` rows; `because` names who says so.
+    /// Checks that there are `expected` rows; `because` names the source of that number.
     ///
     /// # Errors
     /// [`FileError::File`].
@@ -101,12 +101,12 @@ pub struct Words {
     path: PathBuf,
     names: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// The line that each row stands in.
+    /// The line number of each row.
     lines: Vec<usize>,
 }
 
 impl Words {
-    /// Reads a table with the names of its columns in the first line. Cells may stand in quotes.
+    /// Reads a table with the names of its columns in the first line. Cells may be quoted.
     ///
     /// # Errors
     /// [`FileError`]: a file that cannot be read, a line of another length, no row.
@@ -138,7 +138,7 @@ impl Words {
         self.names.first().map_or("", String::as_str)
     }
 
-    /// The line of the file that a row stands in.
+    /// The line number of a row in the file.
     pub fn line(&self, row: usize) -> usize {
         self.lines[row]
     }
@@ -174,7 +174,7 @@ fn cells(line: &str) -> Vec<String> {
     cells.iter().map(|cell| cell.trim().to_owned()).collect()
 }
 
-/// A word as a cell: in quotes where it holds a comma, a quote or the end of a line.
+/// A word as a cell: in quotes where it contains a comma, a quote or the end of a line.
 pub fn quoted(word: &str) -> String {
     if word.contains([',', '"', '\n', '\r']) { format!("\"{}\"", word.replace('"', "\"\"")) } else { word.to_owned() }
 }
@@ -192,12 +192,12 @@ impl Table {
         Table { text: columns.join(",") + "\n", columns: columns.len() }
     }
 
-    /// Adds a row; one number a column.
+    /// Adds a row; one number per column.
     pub fn row(&mut self, numbers: &[f64]) {
         self.cells(numbers.iter());
     }
 
-    /// Adds a row of numbers and plain words, one cell a column; nothing in them is quoted.
+    /// Adds a row of numbers and plain words, one cell per column; nothing in them is quoted.
     pub fn cells<C: Display>(&mut self, cells: impl IntoIterator<Item = C>) {
         let mut count = 0;
         for cell in cells {

@@ -1,6 +1,6 @@
-//! How long a run or a landscape took: `effort.json`, beside results whose bytes do not depend on it.
+//! The computing time of a run or a likelihood grid: `effort.json`, beside results whose bytes do not depend on it.
 //!
-//! Sessions of a computation that was stopped and gone on with add up; one that was killed is missing.
+//! Sessions of a resumed computation add up; killed ones are missing.
 
 use super::atomic::{WriteError, write_json};
 use serde::{Deserialize, Serialize};
@@ -12,16 +12,16 @@ pub const EFFORT: &str = "effort.json";
 /// The content of `effort.json`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
-    /// Seconds of all sessions, the search before included.
+    /// Seconds of all sessions, including the preceding search.
     pub seconds: f64,
-    /// Sessions that ended by themselves or by a signal.
+    /// Sessions that finished or were stopped by a signal.
     pub sessions: u32,
     /// Threads of the last one.
     pub threads: usize,
 }
 
 impl Effort {
-    /// What is recorded in `folder`; `None` where nothing readable is.
+    /// The record in `folder`; `None` where none is readable.
     pub fn read(folder: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(folder.join(EFFORT)).ok()?).ok()
     }

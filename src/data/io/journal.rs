@@ -10,7 +10,7 @@ use std::path::Path;
 
 pub use super::lines::JournalError;
 
-/// Keys of every line, whatever is sampled; the last is what `model_applications` was called before.
+/// Keys of every line, whatever is sampled; the last is the former name of `model_applications`.
 const KEYS: [&str; 10] = [
     "ensemble",
     "step",
@@ -51,7 +51,7 @@ impl Journal {
         Ok(Journal { file: claim.begin()?, shape, lines: 0 })
     }
 
-    /// Opens a journal to go on with it: reads the complete steps, and cuts the file after them.
+    /// Opens a journal to resume it: reads the complete steps, and cuts the file after them.
     ///
     /// # Errors
     /// Those of [`read`], and [`JournalError::Locked`]. The file is only cut when it can be read without error.
@@ -84,7 +84,7 @@ impl Journal {
     }
 }
 
-/// Reads the complete steps of a journal and leaves the file alone; it may be being written meanwhile.
+/// Reads the complete steps of a journal without changing the file, which may be written at the same time.
 ///
 /// # Errors
 /// [`JournalError::Io`]; [`JournalError::Line`] for anything wrong but a torn tail.
@@ -103,7 +103,7 @@ pub fn read_to_end(path: &Path, shape: &Shape) -> Result<(Chain, bool), JournalE
     Ok((reader.chain, is_whole))
 }
 
-/// Gathers lines into whole steps.
+/// Collects lines into complete steps.
 struct StepReader {
     chain: Chain,
     step: Vec<Record>,
@@ -114,7 +114,7 @@ impl StepReader {
         StepReader { chain: Chain::new(shape.clone()), step: Vec::with_capacity(shape.size()) }
     }
 
-    /// Takes the next line; whether a step is whole with it.
+    /// Takes the next line; whether it completes a step.
     fn take(&mut self, line: &[u8]) -> Result<bool, Refusal> {
         let shape = self.chain.shape();
         let record = parse_line(line, shape)?;
@@ -146,7 +146,7 @@ fn check_names(shape: &Shape) -> Result<(), JournalError> {
     }
 }
 
-/// Names of the parameters, then those of the numbers beside the log-probability.
+/// Names of the parameters, then those of the other values of an evaluation.
 fn named(shape: &Shape) -> impl Iterator<Item = &String> {
     shape.names.iter().chain(&shape.numbers)
 }
@@ -192,7 +192,7 @@ impl<'de> DeserializeSeed<'de> for LineSeed<'_> {
     }
 }
 
-/// A line, as far as it is read.
+/// A partially read line.
 #[derive(Default)]
 struct Slots {
     counts: [Option<usize>; 3],

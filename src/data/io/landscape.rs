@@ -1,4 +1,4 @@
-//! A landscape as text: `landscape.jsonl`, one line per node, in the order of the grid.
+//! A likelihood grid as text: `landscape.jsonl`, one line per node, in the order of the grid.
 //!
 //! `{"index":0,"k_kms":0.0,...,"log_likelihood":-38.2,"spottedness":0.06,"entropy":-0.2,"chi2":2764.5,"lambda":0.001,
 //! "model_applications":24,"status":"converged"}`.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Opens a landscape to go on with it: the nodes so far, and the file cut after them.
+/// Opens a likelihood grid to resume it: the nodes so far, and the file cut after them.
 ///
 /// # Errors
 /// [`JournalError`]: a file that cannot be opened, is being written, or does not hold the first nodes of `grid` with
@@ -21,7 +21,7 @@ pub fn recover(path: &Path, grid: Grid, numbers: &[String]) -> Result<(LineFile,
     Ok((file, landscape))
 }
 
-/// Reads the nodes so far and leaves the file alone; it may be being written meanwhile.
+/// Reads the nodes so far without changing the file, which may be written at the same time.
 ///
 /// # Errors
 /// As [`recover`].
@@ -72,7 +72,7 @@ impl Serialize for Named<'_> {
     }
 }
 
-/// The same, coordinates and numbers not told apart yet.
+/// The same, with coordinates and numbers not yet separated.
 #[derive(Deserialize)]
 struct ReadLine {
     index: usize,

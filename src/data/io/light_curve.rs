@@ -1,4 +1,5 @@
-//! Light curves: tables of time, flux and its error as others write them, and the one that `dimcmc simulate` writes.
+//! Light curves: tables of time, flux and its error in the formats of others, and the one that `dimcmc simulate`
+//! writes.
 
 mod columns;
 mod zero_point;
@@ -16,28 +17,28 @@ pub use zero_point::fitting;
 /// Columns of the table that is written.
 const COLUMNS: [&str; 3] = ["time", "flux", "sigma"];
 
-/// Times beyond it (d) are a mistake, and so are fluxes.
+/// Times (d) and fluxes beyond this are mistakes.
 const LARGEST: [f64; 2] = [1e9, 1e30];
 
-/// Magnitudes beyond these stand for none.
+/// Magnitudes beyond these are missing values.
 const MAGNITUDES: [f64; 2] = [-30.0, 40.0];
 
-/// Where more than this share of the fluxes is 0 or below, they are no fluxes.
+/// Where more than this share of the fluxes is 0 or below, they are not fluxes.
 const FEW: f64 = 0.1;
 
-/// Fluxes without a unit whose median is in this range, and most of which lie within so much, are magnitudes: fluxes
-/// are near 1, or counts by the hundred.
+/// Fluxes without a unit whose median is in this range, most of which lie within this of it, are magnitudes: fluxes are
+/// near 1, or counts by the hundred.
 const LIKE_MAGNITUDES: [f64; 2] = [2.5, 30.0];
 const SPAN_OF_MAGNITUDES: f64 = 2.5;
 
-/// A light curve as it is in its file.
+/// A light curve as in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     /// The measurements, in the order of time.
     pub fluxes: Vec<Flux>,
-    /// What was made of the table on reading.
+    /// Remarks on the reading of the table.
     pub remarks: Vec<String>,
-    /// From where its days are counted, as a Julian date, where the table says so and it is not from 0.
+    /// The origin of its times, as a Julian date, where the table gives one other than 0.
     pub zero_jd: Option<f64>,
 }
 
@@ -45,15 +46,14 @@ pub struct Measurements {
 enum Unused {
     /// Its flag says so.
     Flagged,
-    /// It lacks a number that makes sense.
+    /// It lacks a valid number.
     Without(String),
 }
 
 /// Reads a light curve.
 ///
 /// # Errors
-/// [`FileError`]: a file that cannot be read, lacks a column that is needed, or has numbers that are none of a light
-/// curve.
+/// [`FileError`]: a file that cannot be read, lacks a column that is needed, or has numbers invalid for a light curve.
 pub fn read(path: &Path) -> Result<Measurements, FileError> {
     read_table(path, Of::LightCurve)
 }
@@ -75,7 +75,7 @@ fn read_table(path: &Path, of: Of) -> Result<Measurements, FileError> {
     })
 }
 
-/// What is to be done with a file that is no text.
+/// Advice on a file that is not text.
 fn no_text(what: NotText, path: &Path) -> String {
     let cure = match what {
         NotText::Fits => {
@@ -216,7 +216,7 @@ fn numbers(row: &Row, columns: &Columns) -> Result<[f64; 3], Unused> {
     ])
 }
 
-/// That many fluxes are 0 or below: the first of them.
+/// The error of too many fluxes of 0 or below, at the first of them.
 fn not_positive(table: &Table, columns: &Columns, dark: usize, all: usize) -> (usize, String) {
     let name = columns.name(columns.value);
     let of_row = |row: &Row| numbers(row, columns).ok().map(|[_, flux, _]| (row.line, flux));
@@ -228,7 +228,7 @@ fn not_positive(table: &Table, columns: &Columns, dark: usize, all: usize) -> (u
     (line, problem)
 }
 
-/// That all measurements are of one band.
+/// Checks that all measurements are of one band.
 fn one_band<'a>(columns: &Columns, cells: impl Iterator<Item = &'a str>) -> Result<(), (usize, String)> {
     let bands: BTreeSet<&str> = cells.filter(|cell| !table::is_missing(cell)).collect();
     match bands.len() {

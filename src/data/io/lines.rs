@@ -1,9 +1,9 @@
-//! Files of JSON lines that grow by whole blocks while something long is computed, and are gone on with after whatever
-//! stopped it.
+//! Files of JSON lines that grow by complete blocks during a long computation, and can be resumed after any
+//! interruption.
 //!
-//! What a crash can leave is recovered: a torn last line and an incomplete last block are dropped. Anything else that
-//! is wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn
-//! tail. While a process writes such a file it holds a lock on it.
+//! The effects of a crash are repaired: a torn last line and an incomplete last block are dropped. Any other fault is
+//! refused with file and line number; a bad line that any complete line follows is corruption, not a torn tail. While a
+//! process writes such a file it holds a lock on it.
 
 use super::atomic::{self, WriteError};
 use serde::Serialize;
@@ -11,7 +11,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// What can be wrong with a journal.
+/// Errors of a journal.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
     /// The file cannot be opened, read or written.
@@ -38,7 +38,7 @@ pub enum JournalError {
         /// What is wrong.
         problem: String,
     },
-    /// What was to be written is not what comes next.
+    /// The block to write is not the next one.
     #[error("{}: {problem}", path.display())]
     Next {
         /// The file.
@@ -54,11 +54,11 @@ pub enum JournalError {
     },
 }
 
-/// Why a line is refused by whoever understands it.
+/// Why a line is refused by its parser.
 #[derive(Debug)]
 pub(super) struct Refusal {
     problem: String,
-    /// Whether it may be what an interruption left of a line.
+    /// Whether it may be a line torn by an interruption.
     torn: bool,
 }
 
@@ -86,9 +86,8 @@ impl From<String> for Refusal {
     }
 }
 
-/// Whether all that there is in `folder` of a computation is `lines`, still empty, and perhaps the `head` that says
-/// what it was begun with: it was stopped, or could not write, before its first result. Nothing is lost when it begins
-/// again.
+/// Whether `folder` contains only `lines`, still empty, and perhaps the `head` with the settings: the computation was
+/// stopped, or could not write, before its first result. Nothing is lost by a new start.
 pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
     let mut found = false;
@@ -105,20 +104,20 @@ pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
     found
 }
 
-/// Takes the lines one by one, without their ends; says whether a block is whole with this one.
+/// Takes the lines one by one, without their ends; returns whether this one completes a block.
 pub(super) type TakeLine<'a> = &'a mut dyn FnMut(&[u8]) -> Result<bool, Refusal>;
 
-/// A place for a file of lines that nobody else takes meanwhile, claimed before a long search for what it begins with.
-/// Unless it begins, file and folders that were made for it go again.
+/// An exclusive claim on a file of lines, made before a long search for its start. Unless the file is begun, it and the
+/// folders created for it are removed.
 #[derive(Debug)]
 pub struct Claim {
     file: File,
     path: PathBuf,
-    /// What was made for it, the innermost first.
+    /// Files and folders created for it, the innermost first.
     made: Made,
 }
 
-/// Files and folders that go where nothing came of them.
+/// Files and folders that are removed if unused.
 #[derive(Clone, Debug, Default)]
 struct Made {
     file: Option<PathBuf>,
@@ -126,7 +125,7 @@ struct Made {
 }
 
 impl Made {
-    /// A folder in which something is stays.
+    /// A folder that is not empty stays.
     fn remove(&self) {
         let is_empty = |path: &&PathBuf| path.metadata().is_ok_and(|file| file.len() == 0);
         let _ = self.file.as_ref().filter(is_empty).map(std::fs::remove_file);
@@ -167,7 +166,7 @@ impl Claim {
         }
     }
 
-    /// What removes all trace of it, for whoever ends the program before it begins.
+    /// A closure that removes all traces of it, for an exit of the program before it is begun.
     pub fn undo(&self) -> impl FnOnce() + Send + use<> {
         let made = self.made.clone();
         move || made.remove()
@@ -207,7 +206,7 @@ impl LineFile {
         Claim::of(path, replace)?.begin()
     }
 
-    /// Opens a file to go on with it: hands its lines to `take`, and cuts it after the last whole block. It is only cut
+    /// Opens a file to resume it: hands its lines to `take`, and cuts it after the last whole block. It is only cut
     /// when it can be read without error.
     pub(super) fn recover(path: &Path, take: TakeLine) -> Result<Self, JournalError> {
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(at(path))?;
@@ -236,8 +235,8 @@ impl LineFile {
     }
 }
 
-/// Hands the lines of a file to `take` and leaves it alone; it may be being written meanwhile. Whether it ends with a
-/// whole block.
+/// Hands the lines of a file to `take` without changing it; it may be written at the same time. Returns whether it ends
+/// with a complete block.
 pub(super) fn read(path: &Path, take: TakeLine) -> Result<bool, JournalError> {
     let file = File::open(path).map_err(at(path))?;
     let whole = scan(&mut BufReader::new(&file), path, take)?;
@@ -273,7 +272,7 @@ fn scan(reader: &mut dyn BufRead, path: &Path, take: TakeLine) -> Result<u64, Jo
         bytes.clear();
         end += reader.read_until(b'\n', &mut bytes).map_err(at(path))? as u64;
         line += 1;
-        // No newline: the end of the file, or of what was written of its last line.
+        // No newline: the end of the file, or of its torn last line.
         let Some(text) = bytes.strip_suffix(b"\n") else { return Ok(complete) };
         match take(text) {
             Ok(true) => complete = end,
@@ -298,7 +297,7 @@ fn lock(file: &File, path: &Path) -> Result<(), JournalError> {
     match file.try_lock() {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => Err(JournalError::Locked { path: path.to_owned() }),
-        // A file system without locks: then nobody else can hold one either.
+        // A file system without locks: no other process can hold one either.
         Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => Ok(()),
         Err(TryLockError::Error(error)) => Err(at(path)(error)),
     }

@@ -1,10 +1,10 @@
-//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment;
+//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` per profile (`#` starts a comment;
 //! columns that are named may hold exposure times, too), and the LSD profiles it names, relative to its folder
 //! (`layout` has their formats).
 //!
-//! Times are days of one count (`times`). VRAD is subtracted from the velocity axis; profiles are read in their whole
-//! width but for bad bins, which may lie beside the velocities that are used, errors as quoted. All are on the bins of
-//! the first, before or after VRAD is subtracted; they may begin and end elsewhere. Stokes V and nulls are not used.
+//! Times are days in one time system (`times`). VRAD is subtracted from the velocity axis; profiles are read over their
+//! full width with quoted uncertainties; bad bins are allowed outside the velocities that are used. All are on the bins
+//! of the first, before or after VRAD is subtracted; they may begin and end elsewhere. Stokes V and nulls are not used.
 
 mod axis;
 mod error;
@@ -36,25 +36,25 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use text::{MIN_BINS, RawProfile};
 
-/// The profiles of a data set as they are in their files, with what the list says of each.
+/// The profiles of a data set as in their files, with the entry of each in the list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProfileSet {
-    /// The profiles in their whole width after subtraction of VRAD, errors as quoted.
+    /// The profiles over their full width after subtraction of VRAD, with quoted uncertainties.
     pub observations: Observations,
-    /// What the list says of each of them.
+    /// The entry of each in the list.
     pub labels: Vec<Label>,
-    /// SHA-256 (hex) of the bytes of the list and of every profile, in the order of the list; `None` of profiles that
-    /// are in no file.
+    /// SHA-256 (hex) of the bytes of the list and of every profile, in the order of the list; `None` for profiles from
+    /// memory.
     pub sha256: Option<String>,
-    /// What was made of the files that a reader of results must know, one line each.
+    /// Remarks on the files for readers of results, one line each.
     pub remarks: Vec<String>,
 }
 
 impl ProfileSet {
-    /// The profiles between first and last velocity (km/s), all bins if `None`, with errors times a factor.
+    /// The profiles between first and last velocity (km/s), all bins if `None`, with uncertainties times a factor.
     ///
     /// # Errors
-    /// Fewer than five bins of a profile, and errors that are none any more.
+    /// Fewer than five bins of a profile, and scaled uncertainties out of range.
     pub fn within(&self, range_kms: Option<(f64, f64)>, sigma_scale: f64) -> Result<Observations, LsdError> {
         let cut = |(profile, label): (&Profile, &Label)| {
             let path = || label.path.clone().unwrap_or_else(|| label.file.clone().into());
@@ -71,8 +71,7 @@ type Range = (f64, f64);
 /// Reads the list at `list` and all profiles it names.
 ///
 /// # Errors
-/// A file that cannot be read, a line that makes no sense, a list of one profile, or profiles on different velocity
-/// axes.
+/// A file that cannot be read, an invalid line, a list of one profile, or profiles on different velocity axes.
 pub fn read(list: &Path) -> Result<ProfileSet, LsdError> {
     read_around(list, None)
 }
@@ -80,13 +79,12 @@ pub fn read(list: &Path) -> Result<ProfileSet, LsdError> {
 /// The profiles that a list names, each in its whole width.
 ///
 /// # Errors
-/// A file that cannot be read, a line that makes no sense, a list of one profile, or profiles on different velocity
-/// axes.
+/// A file that cannot be read, an invalid line, a list of one profile, or profiles on different velocity axes.
 pub fn read_observations(list: &Path) -> Result<Observations, LsdError> {
     Ok(read(list)?.observations)
 }
 
-/// As [`read`], where the velocities between two (km/s, after VRAD) are used: bad bins outside do no harm.
+/// As [`read`], for a velocity range (km/s, after VRAD): bad bins outside are allowed.
 ///
 /// # Errors
 /// As [`read`].
@@ -111,14 +109,13 @@ pub const FEWEST: usize = 2;
 /// As [`read`].
 pub fn read_listed(list: &Path, bytes: &[u8], range_kms: Option<Range>, fewest: usize) -> Result<ProfileSet, LsdError> {
     let entries = parse_list(list, bytes)?;
-    // a list that is none, a profile for one, is told of by what it names
+    // errors of a file that is not a list, such as a profile, name its entries
     entries.iter().filter(|entry| !entry.path.exists()).try_for_each(|entry| read_profile(list, entry).map(drop))?;
     times::check(&entries, fewest).map_err(|(line, problem)| FileError::Line { path: list.into(), line, problem })?;
     read_entries(list, bytes, entries, range_kms)
 }
 
-/// Reads the list at `list`, which [`write()`] wrote, and all profiles it names: of a simulation, whatever its times
-/// are.
+/// Reads the list at `list`, which [`write()`] wrote, and all profiles it names: of a simulation, with any times.
 ///
 /// # Errors
 /// As [`read`], but for the times.
@@ -148,7 +145,7 @@ fn read_entries(
         let text = table::text(&bytes).map_err(|what| FileError::of(&entry.path, no_text(what, entry)))?;
         let raw = text::parse(&text).map_err(fail)?;
         let (first, axis) = *first.get_or_insert((entry, raw.axis));
-        // within rounding of a bin a range is what it is
+        // a range within rounding of a bin is kept
         let slack = 1e-6 * axis.step;
         let in_file = |(from, to): Range| (from + entry.vrad_kms - slack, to + entry.vrad_kms + slack);
         let used = raw.usable(range_kms.map(in_file)).map_err(fail)?;
@@ -179,7 +176,7 @@ fn begins((first, axis): (&Entry, Axis), (entry, own): (&Entry, Axis), start: us
     let star = axis.moved(-first.vrad_kms);
     let at = |first: f64, bin: i64| first + (bin + start as i64) as f64 * axis.step;
     match (axis.bin_of(&own), star.bin_of(&own.moved(-entry.vrad_kms))) {
-        // one of them by chance: the other is nearer by more than rounding
+        // one of them agrees by chance: the other is nearer by more than rounding
         (Some((_, off)), Some((bin, least))) if off > least + 1e-6 * axis.step => return Ok(at(star.first, bin)),
         (Some((bin, _)), _) => return Ok(at(axis.first, bin) - entry.vrad_kms),
         (None, Some((bin, _))) => return Ok(at(star.first, bin)),
@@ -206,7 +203,7 @@ fn begins((first, axis): (&Entry, Axis), (entry, own): (&Entry, Axis), start: us
     })
 }
 
-/// What to do with a profile that is no text.
+/// Advice on a profile that is not text.
 fn no_text(what: NotText, Entry { path, .. }: &Entry) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let cure = match what {
@@ -220,15 +217,15 @@ fn no_text(what: NotText, Entry { path, .. }: &Entry) -> String {
     format!("is {what}; a profile is text, rows of velocity (km/s), I and sigma{cure}")
 }
 
-/// What a remark on a wild bin says.
+/// The text of a remark on an outlying bin.
 const WILD: &str = "errors away from its neighbours";
 
-/// Whether a remark tells of a wild bin, which may be why nothing fits.
+/// Whether a remark is on an outlying bin, which may explain a bad fit.
 pub fn tells_of_wild_bin(remark: &str) -> bool {
     remark.contains(WILD)
 }
 
-/// The profiles with a wild bin, a line each.
+/// The profiles with an outlying bin, one line each.
 fn wild(entries: &[Entry], profiles: &[Profile]) -> Vec<String> {
     let remark = |wild: wild::Wild| {
         let (entry, profile) = (&entries[wild.profile], &profiles[wild.profile]);
@@ -245,7 +242,7 @@ fn wild(entries: &[Entry], profiles: &[Profile]) -> Vec<String> {
     wild::bins(profiles).into_iter().map(remark).collect()
 }
 
-/// Profiles by what is to be said of them.
+/// Profiles by the remark on them.
 #[derive(Default)]
 struct Found(BTreeMap<Finding, Vec<String>>);
 
@@ -308,7 +305,7 @@ fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {
     })
 }
 
-/// What of a profile lies within the velocity range, errors scaled.
+/// The part of a profile within the velocity range, uncertainties scaled.
 fn cut(profile: &Profile, range_kms: Option<(f64, f64)>, sigma_scale: f64) -> Result<Profile, String> {
     let bins = profile.intensity.len();
     let (lo, hi) = range_kms.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));

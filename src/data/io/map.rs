@@ -1,5 +1,5 @@
 //! The files of the maps of a star: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`; where there are light curves
-//! `lightcurve.csv`, too, and where indicators count `indicators.csv`.
+//! also `lightcurve.csv`, and where indicators are used `indicators.csv`.
 
 mod beside;
 
@@ -22,21 +22,20 @@ use crate::surface::{MEAN_FILLING, MapSummary, SpotField, SurfaceMap, SurfaceMap
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Maps with all that their files say of them.
+/// Maps with all contents of their files.
 #[derive(Clone, Debug)]
 pub struct MapResult<'a> {
-    /// What the data were imaged with.
+    /// The imager of the data.
     pub imager: &'a Imager,
     /// The data.
     pub observations: &'a Observations,
     /// The maps.
     pub maps: &'a SurfaceMaps,
-    /// The true map on the imager's pixels, of the same kind, for simulated data; of several seasons one after the
-    /// other.
+    /// The true map on the imager's pixels, of the same kind, for simulated data; for several seasons in sequence.
     pub true_map: Option<&'a [f64]>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
-    /// Why the model does not fit as well as the errors promise, if it does not.
+    /// Why the model does not fit within the uncertainties, if it does not.
     pub diagnosis: Option<serde_json::Value>,
     /// Config, data and program.
     pub provenance: &'a Provenance,
@@ -55,7 +54,7 @@ pub fn is_file(name: &str) -> bool {
 /// Name of the map.
 pub const MAP: &str = "map.json";
 
-/// Name of what says how good it is.
+/// Name of the file with the quality of the fit.
 pub const FIT: &str = "fit.json";
 
 /// The column of `profiles.csv` and `rv.csv` with the number of the season, from 1, where there are several.
@@ -67,7 +66,7 @@ pub const UNCHANGING: &str = "unchanging_model";
 /// Names of the files, in the order in which they are written.
 pub const FILES: [&str; 4] = [MAP, "profiles.csv", "rv.csv", FIT];
 
-/// Where longitudes count from, for those who read the file without the manual.
+/// The origin of longitudes, for readers without the manual.
 const CONVENTIONS: &str = "psi = longitude + Omega(latitude) (t - epoch_d) is the angle from the central meridian, \
      growing towards the receding limb; Omega(latitude) = omega_eq_rad_d - domega_rad_d sin^2(latitude). Pixels of \
      equal area lie in rings from south to north; ring_pixels are their numbers, and sin(latitude) of a ring's \
@@ -77,7 +76,7 @@ const CONVENTIONS: &str = "psi = longitude + Omega(latitude) (t - epoch_d) is th
 /// The content of `map.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapFile {
-    /// Where longitudes count from, in words.
+    /// The origin of longitudes, in words.
     pub conventions: String,
     /// Rotation period (d).
     pub rotation_period_d: f64,
@@ -87,18 +86,18 @@ pub struct MapFile {
     pub parameters: ParameterValues,
     /// Brightness of a spot over that of the photosphere.
     pub contrast: f64,
-    /// Each of several data sets, in the order of the profiles.
+    /// One entry per data set, if several, in the order of the profiles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data_sets: Vec<MeasuredSet>,
-    /// The spots as a field, where they are one.
+    /// The spots as a field, where they are modelled as one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<SpotField>,
-    /// Its mean filling factor, which is assumed: profiles do not tell it.
+    /// Its mean filling factor, which is assumed: profiles do not constrain it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_filling: Option<f64>,
     /// Number of pixels.
     pub pixels: usize,
-    /// The same in each ring, from south to north.
+    /// Number of pixels in each ring, from south to north.
     pub ring_pixels: Vec<usize>,
     /// Of the middle of each pixel.
     pub longitude_deg: Vec<f64>,
@@ -106,10 +105,10 @@ pub struct MapFile {
     pub latitude_deg: Vec<f64>,
     /// Share of the surface of each pixel.
     pub area_fraction: Vec<f64>,
-    /// The map of all times, where there is one: of several seasons the mean over them.
+    /// The map of all times, where there is one: for several seasons their mean.
     #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub mean: Option<OneMap>,
-    /// The maps in the order of time: one, one a season, or one at each time asked for. Earlier versions wrote none.
+    /// The maps in the order of time: one, one per season, or one at each requested time. Earlier versions wrote none.
     #[serde(default)]
     pub maps: Vec<MapAt>,
 }
@@ -119,9 +118,9 @@ pub struct MapFile {
 pub struct OneMap {
     /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
-    /// The same of the star that was simulated.
+    /// The same for the simulated star.
     pub true_spottedness: Option<f64>,
-    /// What the pixels hold.
+    /// The values of the pixels.
     #[serde(flatten)]
     pub pixels: MapColumns,
 }
@@ -140,24 +139,24 @@ pub struct MapAt {
     /// The rotation cycle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cycle: Option<f64>,
-    /// The season that it is of, and how often the star was seen, where there are several.
+    /// Its season with the number of profiles, where there are several.
     #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub season: Option<Season>,
-    /// As [`OneMap::spottedness`], of one of several seasons.
+    /// As [`OneMap::spottedness`], for one of several seasons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spottedness: Option<f64>,
-    /// The same of the star that was simulated.
+    /// The same for the simulated star.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub true_spottedness: Option<f64>,
-    /// What the pixels hold; below 0 a spot filling factor is brighter than the photosphere.
+    /// The values of the pixels; below 0 a spot filling factor is brighter than the photosphere.
     #[serde(flatten)]
     pub pixels: MapColumns,
-    /// Standard deviation of the filling factors, what is assumed of the field held.
+    /// Standard deviation of the filling factors, for fixed hyperparameters of the field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_spot_filling: Option<Vec<f64>>,
 }
 
-/// What the pixels hold, and what those of the star that was simulated do.
+/// The values of the pixels, and those of the simulated star.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum MapColumns {
@@ -165,15 +164,15 @@ pub enum MapColumns {
     Spots {
         /// Of the map.
         spot_filling: Vec<f64>,
-        /// Of the star that was simulated.
+        /// Of the simulated star.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         true_spot_filling: Option<Vec<f64>>,
     },
-    /// Brightness relative to the photosphere. Profiles say nothing of the scale; the entropy has it near 1.
+    /// Brightness relative to the photosphere. Profiles do not constrain the scale; the entropy keeps it near 1.
     BrightAndDark {
         /// Of the map.
         brightness: Vec<f64>,
-        /// Of the star that was simulated.
+        /// Of the simulated star.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         true_brightness: Option<Vec<f64>>,
     },
@@ -182,29 +181,29 @@ pub enum MapColumns {
 /// The content of `fit.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitFile {
-    /// How good the fit is.
+    /// Quality of the fit.
     #[serde(flatten)]
     pub summary: MapSummary,
-    /// The spots as a field, where they are one.
+    /// The spots as a field, where they are modelled as one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<SpotField>,
-    /// One entry a profile, in the order of the list.
+    /// One entry per profile, in the order of the list.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<LineAndContinuum>,
-    /// The same for the offset of its velocity by the RV jitter.
+    /// The same for the RV offset of each profile due to jitter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zero_points_kms: Vec<f64>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
     /// Whether the residuals look like noise.
     pub checks: Checks,
-    /// Why the model does not fit as well as the errors promise, if it does not.
+    /// Why the model does not fit within the uncertainties, if it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<serde_json::Value>,
-    /// Images of other chi2, where there is a target.
+    /// Images at other chi2, where there is a target.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub trade_off: Vec<TradeOffNode>,
-    /// What has to be known of maps and times.
+    /// Remarks on maps and times.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// Config, data and program.
@@ -234,8 +233,8 @@ impl Saved for MapFile {
     }
 }
 
-/// Columns that profiles have beside the others where there are several seasons or data sets, each with the number of
-/// each profile, from 1.
+/// Additional columns of profiles where there are several seasons or data sets, each with the number of each profile,
+/// from 1.
 fn beside(imager: &Imager) -> Vec<(&'static str, Vec<usize>)> {
     let seasons = imager.map_of_each().into_iter().map(|map| map + 1).collect();
     let columns: [(_, Vec<usize>); 2] = [(SEASON, seasons), (DATA_SET, imager.set_of_each())];
@@ -243,7 +242,7 @@ fn beside(imager: &Imager) -> Vec<(&'static str, Vec<usize>)> {
 }
 
 impl MapColumns {
-    /// What there is of them.
+    /// The existing ones.
     fn columns(&self) -> Vec<&Vec<f64>> {
         let (MapColumns::Spots { spot_filling: own, true_spot_filling: truth }
         | MapColumns::BrightAndDark { brightness: own, true_brightness: truth }) = self;
@@ -265,7 +264,7 @@ impl MapResult<'_> {
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
         write_set(folder, &|stage| self.fill(stage))?;
-        // of earlier maps, which had what these have not
+        // files of earlier maps that these do not have
         let files = files(self.maps);
         for name in [LIGHT_CURVES, INDICATORS].into_iter().filter(|name| !files.contains(name)) {
             let path = folder.join(name);

@@ -1,5 +1,5 @@
-//! Files in and out: LSD profiles, the journals of chains and landscapes, maps, tables, Zarr stores. No decisions are
-//! taken here.
+//! Files in and out: LSD profiles, the journals of chains and likelihood grids, maps, tables, Zarr stores. No decisions
+//! are taken here.
 
 pub mod atomic;
 pub mod csv;
@@ -20,16 +20,16 @@ pub mod zdipy;
 
 use std::path::{Path, PathBuf};
 
-/// An uncertainty smaller than the usual one by more than this is a mistake, and would decide everything.
+/// An uncertainty smaller than the usual one by more than this factor is a mistake that would dominate the fit.
 const OUT_OF_PROPORTION: f64 = 1e3;
 
-/// That an uncertainty is so small beside the `usual` one that it would outweigh all other `rows`, where it is.
+/// The error of an uncertainty so small relative to the `usual` one that it would outweigh all other `rows`, if it is.
 fn outweighs(sigma: f64, usual: f64, rows: &str) -> Option<String> {
     let problem = || format!("less than a thousandth of the usual {usual:.1e}: it would outweigh all other {rows}");
     (OUT_OF_PROPORTION * sigma < usual).then(problem)
 }
 
-/// What is wrong with a table, a list or another program's file: one line that names the file, and the line in it.
+/// The error of a table, a list or another program's file: one line that names the file, and the line in it.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// It cannot be read.
@@ -37,7 +37,7 @@ pub enum FileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         source: std::io::Error,
     },
     /// A line is wrong.
@@ -50,7 +50,7 @@ pub enum FileError {
         /// What is wrong.
         problem: String,
     },
-    /// It is wrong as a whole.
+    /// The file as a whole is wrong.
     #[error("{}: {problem}", path.display())]
     File {
         /// The file.

@@ -1,4 +1,4 @@
-//! The paraboloid of a landscape as a file: `paraboloid.json`, or in it why there is none.
+//! The paraboloid of a likelihood grid as a file, `paraboloid.json`, or the reason why there is none.
 
 use super::atomic::{WriteError, write_json};
 use super::saved::{Saved, square};
@@ -35,7 +35,7 @@ impl Saved for ParaboloidFile {
 }
 
 impl ParaboloidFile {
-    /// What was `found` around the highest node of a landscape on `grid`.
+    /// The result `found` around the highest node of a likelihood grid on `grid`.
     pub fn new(
         grid: &Grid,
         rule: Rule,
@@ -56,7 +56,7 @@ impl ParaboloidFile {
     }
 }
 
-/// What the user asked for when the file at `path` was written; the default where there is none.
+/// The user's choice of nodes when the file at `path` was written; the default where there is none.
 pub fn rule(path: &Path) -> Rule {
     let text = std::fs::read(path).ok();
     text.and_then(|text| serde_json::from_slice(&text).ok()).map(|file: ParaboloidFile| file.rule).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! What every result says of where it came from.
+//! The provenance in every result.
 
 use crate::model::Parameter;
 use crate::numerics::json::Part;
@@ -11,7 +11,7 @@ use crate::surface::calibration::target::ChosenTarget;
 use crate::surface::{ConstantVelocity, FieldStart, FittedContrast, FittedIndicator, OtherRotation};
 use serde::{Deserialize, Serialize};
 
-/// Config, data and program that made a result.
+/// Config, data and program of a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Version of the program.
@@ -22,15 +22,15 @@ pub struct Provenance {
     pub config_sha256: String,
     /// The config with all defaults filled in.
     pub config: serde_json::Value,
-    /// What the config leaves to the observations.
+    /// Quantities that the config leaves to the observations.
     #[serde(default, skip_serializing_if = "Measured::is_empty")]
     pub measured: Measured,
 }
 
-/// Settings that were taken from the observations before anything else, and what was made of these.
+/// Settings measured on the observations first, and remarks on their preparation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// What was made of the profiles on reading.
+    /// Remarks on the reading of the profiles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub profiles: Vec<String>,
     /// `observations.sigma_scale` and `.weights`.
@@ -39,22 +39,22 @@ pub struct Measured {
     /// `observations.velocity_jitter_kms`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_jitter: Option<MeasuredJitter>,
-    /// Each of several data sets, in the order of the profiles.
+    /// One entry per data set, if several, in the order of the profiles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<MeasuredSet>,
-    /// Each of several seasons, in the order of time.
+    /// One entry per season, if several, in the order of time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub seasons: Vec<Season>,
-    /// What was made of the light curves, in words.
+    /// The preparation of the light curves, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curves: Vec<String>,
-    /// What was left out of the light curves and converted, in words.
+    /// Exclusions and conversions of the light curves, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curve_notes: Vec<String>,
     /// `indicators`: gains and jitters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub indicators: Vec<FittedIndicator>,
-    /// What was made of the indicators on reading, in words.
+    /// The preparation of the indicators, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub indicator_notes: Vec<String>,
     /// `star.regions`.
@@ -63,10 +63,10 @@ pub struct Measured {
     /// `observations.events`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub events: Option<Events>,
-    /// `star.velocity_drift`: slopes of the RVs that the profiles show (km/s per day), with which they are imaged.
+    /// `star.velocity_drift`: fitted slopes of the RVs (km/s per day), used for imaging.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drift_kms_d: Vec<f64>,
-    /// The field of spots that was fitted on the way to star and events, from which a fit with finer maps begins.
+    /// The field of spots fitted together with star and events, the start of a fit with finer maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_start: Option<FieldStart>,
     /// Another rotation period with which the profiles are far more probable.
@@ -77,7 +77,7 @@ pub struct Measured {
     pub chi2_target: Option<ChosenTarget>,
 }
 
-/// A season of a star that does not change within it.
+/// A season, with one static map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Season {
     /// Time of its first profile (d).
@@ -86,7 +86,7 @@ pub struct Season {
     pub last_d: f64,
     /// Number of them.
     pub profiles: usize,
-    /// Where longitudes of its map count from, in place of the star's `epoch_d`: whole cycles later (d).
+    /// Origin of longitudes of its map (d), in place of the star's `epoch_d`: whole cycles later.
     pub epoch_d: f64,
 }
 
@@ -113,7 +113,7 @@ pub struct MeasuredSet {
 }
 
 impl MeasuredSet {
-    /// It in words.
+    /// The data set in words.
     pub fn line(&self) -> String {
         let zero_point = self.zero_point.as_ref().map(|of_set| match of_set.found {
             Some(ConstantVelocity { value_kms, sigma_kms }) => {
@@ -130,7 +130,7 @@ impl MeasuredSet {
 }
 
 impl MeasuredSet {
-    /// Why the contrast of its spots cannot be what was fitted, with a name for it.
+    /// Why the fitted contrast of its spots is implausible, with a name for it.
     fn problem(&self) -> Option<String> {
         self.contrast.filter(FittedContrast::is_at_bound)?;
         Some(format!(
@@ -147,21 +147,22 @@ impl Measured {
         *self == Measured::default()
     }
 
-    /// The same with what was `found` of the zero points that are fitted, in the order of the sets.
+    /// The same with the RV offsets `found` by the fit, in the order of the sets.
     pub fn with_zero_points(mut self, found: &[ConstantVelocity]) -> Self {
         let fitted = self.sets.iter_mut().filter_map(|set| set.zero_point.as_mut());
         fitted.zip(found).for_each(|(of_set, found)| of_set.found = Some(*found));
         self
     }
 
-    /// Why nothing can be judged with what was found of star and events, with a name for it.
+    /// Why no verdict is possible with the fitted star and events, with a name for it.
     pub fn problem(&self) -> Option<String> {
         let of_events = self.events.as_ref().and_then(Events::too_many);
         let of_contrasts = || self.sets.iter().find_map(MeasuredSet::problem);
         of_events.or_else(|| self.star.as_ref().and_then(MeasuredStar::problem)).or_else(of_contrasts)
     }
 
-    /// That the uncertainty of a free inclination lacks that of active regions (`results/calibration-stellar.md`).
+    /// The remark that the uncertainty of a free inclination excludes that of active regions
+    /// (`results/calibration-stellar.md`).
     pub fn held_regions(&self, free: &[String]) -> Option<String> {
         let is_region = |name: &str| Parameter::REGIONS.iter().any(|p| p.name() == name);
         let is_free = |name: &str| free.iter().any(|free| free == name);
@@ -174,7 +175,7 @@ impl Measured {
         })
     }
 
-    /// That the model does not fit as well as the continuum promises, where the errors say so.
+    /// The remark that residuals exceed the continuum noise, where uncertainties show it.
     pub fn misfit_text(&self) -> Option<String> {
         let of_set = |set: &MeasuredSet| Some(format!("{}: {}", set.name, set.errors.as_ref()?.misfit_text()?));
         match &self.errors {
@@ -183,7 +184,7 @@ impl Measured {
         }
     }
 
-    /// It in words, label and text a line.
+    /// In words, one label and text per line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let profiles = self.profiles.iter().map(|remark| ("profiles", remark.clone()));
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));

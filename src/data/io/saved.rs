@@ -1,23 +1,23 @@
-//! What every JSON file of results must hold before it is used again: someone may have edited or cut it.
+//! Checks of every JSON file of results before it is used again: it may have been edited or truncated.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Beyond this a finite number is no result of this program, and nothing can be drawn with it.
+/// Larger finite numbers are not results of this program and cannot be plotted.
 pub const LARGEST: f64 = 1e100;
 
-/// Keys of numbers above 0, wherever they stand.
+/// Keys of numbers above 0, anywhere in the file.
 const POSITIVE: [&str; 5] = ["period_d", "rotation_period_d", "porb_over_prot", "min_period_d", "max_period_d"];
 
-/// Configs are checked by who resolves them.
+/// Configs are checked on resolving.
 const CONFIG: &str = "config";
 
 /// The content of a JSON file that is read again.
 pub trait Saved: DeserializeOwned {
-    /// That its parts belong together.
+    /// Checks that its parts are consistent.
     ///
     /// # Errors
-    /// The key at fault, and what is wrong.
+    /// The key at fault, and its error.
     fn check(&self) -> Result<(), String> {
         Ok(())
     }
@@ -25,10 +25,10 @@ pub trait Saved: DeserializeOwned {
 
 impl Saved for serde_json::Map<String, Value> {}
 
-/// That all numbers of a file are such as the program writes.
+/// Checks that all numbers of a file are possible output of the program.
 ///
 /// # Errors
-/// The first key whose number is not.
+/// The first key with another number.
 pub fn check_numbers(value: &Value) -> Result<(), String> {
     walk(value, &mut Vec::new())
 }
@@ -58,10 +58,10 @@ fn walk(value: &Value, way: &mut Vec<String>) -> Result<(), String> {
     }
 }
 
-/// That a list has as many entries as another one.
+/// Checks that a list has as many entries as another one.
 ///
 /// # Errors
-/// That it has not.
+/// Another length.
 pub fn as_many(key: &str, found: usize, expected: usize, of: &str) -> Result<(), String> {
     match found == expected {
         true => Ok(()),
@@ -69,10 +69,10 @@ pub fn as_many(key: &str, found: usize, expected: usize, of: &str) -> Result<(),
     }
 }
 
-/// That a matrix is square, with a row for each of `n` names.
+/// Checks that a matrix is square, with a row for each of `n` names.
 ///
 /// # Errors
-/// That it is not.
+/// Another shape.
 pub fn square(key: &str, matrix: &[Vec<f64>], n: usize) -> Result<(), String> {
     as_many(key, matrix.len(), n, "names")?;
     matrix.iter().try_for_each(|row| as_many(key, row.len(), n, "names"))

@@ -1,4 +1,4 @@
-//! What a simulation, or an injection into observed profiles, was made with: `truth.json`.
+//! The inputs of a simulation, or of an injection into observed profiles: `truth.json`.
 
 use super::atomic::{WriteError, write_json};
 use super::provenance::Provenance;
@@ -18,29 +18,29 @@ pub struct Truth {
     /// The parameters as simulated.
     pub parameters: ParameterValues,
     /// The spots as a config lists them, drawn ones behind listed ones: longitude, latitude and radius in degrees,
-    /// filling factor; of those that come and go the time of the largest area and the lifetime (d).
+    /// filling factor; for evolving spots also the time of the largest area and the lifetime (d).
     pub spots: Vec<Vec<f64>>,
     /// The faculae, if there are any: longitude, latitude and radius in degrees, excess of brightness.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub faculae: Option<serde_json::Value>,
-    /// Beside faculae: brightness of a spot over that of the photosphere.
+    /// With faculae: brightness of a spot over that of the photosphere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contrast: Option<f64>,
-    /// What is wrong with each profile by itself, in line and continuum.
+    /// Errors of line and continuum of each profile.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub continuum: Vec<LineAndContinuum>,
-    /// The velocity zero point of each profile (km/s), which is not part of `orbit_kms`.
+    /// The RV jitter of each profile (km/s), which is not part of `orbit_kms`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zero_points_kms: Vec<f64>,
-    /// The zero point of the whole data set (km/s), which is not part of `orbit_kms` either; if there is one.
+    /// The RV offset of the data set (km/s), if there is one; not part of `orbit_kms` either.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_point_kms: Option<f64>,
-    /// Over how many bins the noise is correlated, where it is not white.
+    /// Correlation length of the noise in bins, where it is not white.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlated_bins: Option<f64>,
-    /// Fractional spot coverage; of a star that changes, the mean over the profiles.
+    /// Fractional spot coverage; for evolving spots the mean over the profiles.
     pub spottedness: f64,
-    /// That at each of `times_d`, of a star that changes.
+    /// That at each of `times_d`, for evolving spots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coverage: Vec<f64>,
     /// Signal-to-noise ratio of each bin; null for no noise.
@@ -55,34 +55,34 @@ pub struct Truth {
     pub times_d: Vec<f64>,
     /// Velocity of the orbit at each of them, plus the systemic velocity (km/s).
     pub orbit_kms: Vec<f64>,
-    /// Where all this came from.
+    /// Provenance.
     #[serde(flatten)]
     pub provenance: Provenance,
 }
 
-/// The content of `truth.json` beside profiles that an orbit was put into.
+/// The content of `truth.json` of profiles with an injected orbit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InjectedTruth {
     /// The orbit, by the names of its parameters.
     pub injected: Orbit,
-    /// What the profiles held before, where they are simulated.
+    /// The truth of the profiles before injection, where they are simulated.
     pub before: Option<ParameterValues>,
     /// Times of the profiles (d).
     pub times_d: Vec<f64>,
-    /// By how much each was shifted (km/s).
+    /// The shift of each (km/s).
     pub velocity_kms: Vec<f64>,
-    /// The observations and the config before.
+    /// The observations and the config before injection.
     #[serde(flatten)]
     pub provenance: Provenance,
 }
 
-/// The content of a `truth.json`, whichever it is.
+/// The content of a `truth.json`, of either kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum TruthFile {
     /// Of a simulation.
     Simulated(Truth),
-    /// Of observed profiles that an orbit was put into.
+    /// Of observed profiles with an injected orbit.
     Injected(InjectedTruth),
 }
 

@@ -1,23 +1,23 @@
-//! Zarr version 3 stores in folders, as far as tables of draws need them: groups, and arrays of numbers with named
+//! Zarr version 3 stores in folders, as needed for tables of draws: groups, and arrays of numbers with named
 //! dimensions.
 //!
 //! Format: the Zarr core specification, version 3 (<https://zarr-specs.readthedocs.io/en/latest/v3/core/>). A group is
 //! a folder with `zarr.json`; an array is one with `zarr.json` and its values in a single chunk, little-endian and in C
 //! order, in `c/0`, `c/0/0`, ... The root repeats the nodes of all the others (`consolidated_metadata`): that is
-//! zarr-python's addition to the specification, which other readers may pass over, and without which xarray complains.
+//! zarr-python's addition to the specification, which other readers may ignore, and without which xarray warns.
 
 use super::atomic::{WriteError, write_folder};
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// What is known of a group or an array besides its values.
+/// Attributes of a group or an array.
 pub type Attributes = Map<String, Value>;
 
 /// A group, the root of a store among them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Group {
-    /// What is known of all of it.
+    /// Its attributes.
     pub attributes: Attributes,
     /// Groups in it, by name.
     pub groups: Vec<(String, Group)>,
@@ -61,7 +61,7 @@ impl Values {
         }
     }
 
-    /// Name of the type, and what stands for a value that was never written.
+    /// Name of the type, and the fill value.
     fn data_type(&self) -> (&'static str, Value) {
         match self {
             Values::Floats(_) => ("float64", json!("NaN")),
@@ -81,7 +81,7 @@ impl Values {
     }
 }
 
-/// Writes a store, in place of the folder at `path` if there is one: whether that may go is the caller's decision.
+/// Writes a store, in place of the folder at `path` if there is one: the caller decides whether that may be replaced.
 ///
 /// # Errors
 /// A folder that cannot be written, a full disc; what was there is still there then.
@@ -112,7 +112,7 @@ struct Consolidated {
     metadata: Nodes,
 }
 
-/// Nodes by their paths. The order is what a reader lists them in, and members of a group must stand together.
+/// Nodes by their paths. The order is what a reader lists them in, and members of a group must be contiguous.
 struct Nodes(Vec<(String, Value)>);
 
 impl Serialize for Nodes {

@@ -1,4 +1,4 @@
-//! What simulated observations were made with: maps and parameters to hold results against.
+//! The truth of simulated observations: maps and parameters to compare with results.
 
 use super::Scene;
 use crate::data::io::provenance::Season;
@@ -10,15 +10,15 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 impl Scene {
-    /// The true spot map on the pixels of the image, if the observations are simulated; of a star that changes, in the
+    /// The true spot map on the pixels of the image, if the observations are simulated; for evolving spots in the
     /// middle of the data.
     #[doc(hidden)]
     pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
         self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
     }
 
-    /// What the image should hold on its pixels, if the observations are simulated; of a star that changes, in the
-    /// middle of the data. The maps of several seasons, each in its middle, stand one after the other.
+    /// The true values of the pixels of the image, if the observations are simulated; for evolving spots in the middle
+    /// of the data. The maps of several seasons, each in its middle, follow one another.
     #[doc(hidden)]
     pub fn true_map(&self) -> Option<Vec<f64>> {
         let of_season = |season: &Season| {
@@ -31,7 +31,7 @@ impl Scene {
         }
     }
 
-    /// A map of which longitudes count from so many days later, between pixels linearly.
+    /// A map with the origin of longitudes shifted by this many days, interpolated linearly between pixels.
     fn turned(&self, map: &[f64], days: f64) -> Vec<f64> {
         let rotation = self.truth.unwrap_or(self.settings.values).state().rotation;
         let SurfaceGrid { rings, latitude, .. } = &self.imager.grid;
@@ -65,7 +65,7 @@ impl Scene {
         self.settings.sets[0].simulation()
     }
 
-    /// What the scene's `simulation` was made with.
+    /// The truth of the scene's `simulation`.
     #[doc(hidden)]
     pub fn truth_of(&self, simulation: &Simulation) -> Truth {
         let grid = SurfaceGrid::equal_area(simulation.pixels, Quadrature::Gauss2x2);
@@ -100,7 +100,7 @@ impl Scene {
         }
     }
 
-    /// The simulated values by name, ephemerides among them where the config names them.
+    /// The simulated values by name, with ephemerides where the config gives them.
     #[doc(hidden)]
     pub fn named_truth(&self) -> Option<BTreeMap<String, f64>> {
         let truth = self.truth?;

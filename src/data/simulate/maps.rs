@@ -1,5 +1,5 @@
-//! Maps of a simulated star: the mean of what spots and faculae make of each pixel. Of a star that changes, pixels are
-//! reckoned anew only where a spot comes or goes.
+//! Maps of a simulated star: the mean over each pixel of spots and faculae. With evolving spots, pixels are recomputed
+//! only where a spot appears or disappears.
 
 use super::Simulation;
 use crate::star::grid::Ring;
@@ -8,19 +8,19 @@ use crate::star::{Brightness, Disc, Facula, Spot, SurfaceGrid};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Points along each side of a pixel at which it is asked whether a spot covers them.
+/// Sampling points along each side of a pixel.
 const COVERAGE_POINTS: usize = 8;
 
-/// What a map holds.
+/// The content of a map.
 #[derive(Clone, Copy)]
 pub(super) enum Content {
     /// Spot filling factors.
     Filling,
-    /// Brightness over that of the photosphere; that of spots is known.
+    /// Brightness over that of the photosphere; with the given brightness of spots.
     Brightness(Brightness),
 }
 
-/// What is on the star.
+/// The features on the star.
 #[derive(Clone, Default)]
 struct Features {
     spots: Vec<Spot>,
@@ -67,7 +67,7 @@ impl Features {
         }
     }
 
-    /// Puts them into a map: into all pixels that one of the `changed` may overlap.
+    /// Updates a map in all pixels that one of the `changed` may overlap.
     fn onto(&self, map: &mut [f64], content: Content, grid: &SurfaceGrid, changed: &Features) {
         for ring in &grid.rings {
             let (latitude, reach) = (grid.latitude[ring.pixels.start], grid.reach(ring));
@@ -87,7 +87,7 @@ impl Features {
 }
 
 impl Simulation {
-    /// Whether spots come and go.
+    /// Whether spots evolve.
     pub fn is_changing(&self) -> bool {
         self.spots.iter().any(|spot| spot.life.is_some())
     }

@@ -1,4 +1,4 @@
-//! Spots drawn at random: for ever, or coming and going.
+//! Spots drawn at random: static, or emerging and decaying.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -42,8 +42,8 @@ impl Default for RandomSpots {
 }
 
 impl RandomSpots {
-    /// How many are drawn for data that cover `time_base_d`: as many emerge a day as make `number` at a time, from a
-    /// lifetime before the data to one after them.
+    /// The number drawn for data that cover `time_base_d`: the emergence rate gives `number` at a time, from a lifetime
+    /// before the data to one after them.
     pub fn count(&self, time_base_d: f64) -> f64 {
         let number = self.number as f64;
         self.lifetime_d.map_or(number, |lifetime| (number * (0.5 * time_base_d / lifetime + 1.0)).round())

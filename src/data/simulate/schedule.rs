@@ -59,8 +59,8 @@ impl Schedule {
         self.times_within(first_d, &|begin_d| Some((begin_d, self.night_hours / HOURS_A_DAY)))
     }
 
-    /// The same, where the profiles of the night that begins at a time (d) are spread over the `window` of that night:
-    /// when it begins (d), and how long it is (d). None are taken where it has none.
+    /// The same, with the profiles of the night that begins at a time (d) spread over its `window`: start (d) and
+    /// length (d). No profiles are taken in a night without one.
     pub fn times_within(&self, first_d: f64, window: &dyn Fn(f64) -> Option<(f64, f64)>) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(STREAM);

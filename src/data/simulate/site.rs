@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 /// J2000.
 const J2000_JD: f64 = 2_451_545.0;
 
-/// The sky is dark while the Sun stands lower than this (degrees): between nautical and astronomical twilight.
+/// The sky is dark while the Sun is lower than this (degrees): between nautical and astronomical twilight.
 const DARK_DEG: f64 = -15.0;
 
-/// Steps of a day, of five minutes.
+/// Steps per day, of five minutes.
 const STEPS: usize = 288;
 
 /// Julian dates that a night may have: 1900 to 2100.
@@ -44,7 +44,7 @@ fn usual_altitude() -> f64 {
 }
 
 impl Site {
-    /// The numbers that are outside of their ranges: key and what is wrong.
+    /// The numbers out of range: key and error.
     pub fn fault(&self) -> Option<(&'static str, String)> {
         let within = |key, value: f64, [low, high]: [f64; 2]| {
             let is_within = (low..=high).contains(&value);
@@ -151,7 +151,7 @@ mod tests {
         // darkness begins after 20:30 UT, and ends before 04:00
         let of_day = |jd: f64| 24.0 * ((jd + 0.5).fract());
         assert!((20.3..21.5).contains(&of_day(first)) && (2.5..4.0).contains(&of_day(last)), "{first} {last}");
-        // the same night, told by a time after midnight or with a constant subtracted
+        // the same night, given by a time after midnight or with a constant subtracted
         assert_eq!(site.window_d(2_461_267.6), Some([first, last]));
         let less = Site { time_zero_jd: 2_400_000.5, ..site };
         let [a, _] = less.window_d(61_267.1).unwrap();

@@ -1,12 +1,12 @@
-//! Planets of known ephemeris: their masses are a question of one number each, K.
+//! Planets of known ephemeris: the only unknown of each is K.
 //!
 //! No other period is searched for them, so that the false-alarm probability of each is that of one period and one
-//! sign: how often a star without it, the other known planets there, has a K as many standard errors above zero at the
-//! ephemeris as given: its errors make planets harder to see, not false ones more frequent. K and its limit, with the
-//! planets in the model, are over all ephemerides within the errors (`docs/method.md` section 4): a tenth of an orbit
-//! beside the true one, K would come out by a fifth too small.
+//! sign: how often a star without it, but with the other known planets, has a K as many standard errors above zero at
+//! the given ephemeris. Errors of the ephemeris make planets harder to detect, not false ones more frequent. K and its
+//! limit, with the planets in the model, are marginalised over all ephemerides within their uncertainties
+//! (`docs/method.md` section 4): a tenth of an orbit off, K would be a fifth too small.
 //!
-//! The blind search beside them leaves their amplitudes free, and where an ephemeris is uncertain what its errors add.
+//! The blind search leaves their amplitudes free, and the effect of ephemeris errors where an ephemeris is uncertain.
 
 use crate::model::{Ephemeris, ParameterValues};
 use crate::planets::mixture::{Mixture, Part};
@@ -19,13 +19,13 @@ use crate::surface::{Linearised, WithoutJitter};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::borrow::Cow;
 
-/// Ephemerides are tried within so many standard errors.
+/// Ephemerides are tried within this many standard errors.
 const REACH: f64 = 3.5;
 
-/// So many periods and so many conjunctions: a step is at most a hundredth of an orbit.
+/// Number of trial periods and of trial conjunctions: a step is at most a hundredth of an orbit.
 const NODES: usize = 71;
 
-/// An ephemeris that is wrong by this part of an orbit adds less than a twentieth of K to the velocities.
+/// An ephemeris that is wrong by this fraction of an orbit adds less than a twentieth of K to the velocities.
 const SMALL_ERROR: f64 = 0.01;
 
 /// K of a planet of known ephemeris.
@@ -33,13 +33,13 @@ const SMALL_ERROR: f64 = 0.01;
 pub struct KnownPlanet {
     /// Its ephemeris.
     pub ephemeris: Ephemeris,
-    /// K and its standard error (km/s) of a star without it, where K may have either sign.
+    /// K and its standard error (km/s) from the star without it, where K may have either sign.
     pub alone: [f64; 2],
-    /// With the planet in the model; `None` where the profiles do not bound it.
+    /// With the planet in the model; `None` where K is unbounded.
     pub k: Option<KnownAmplitude>,
 }
 
-/// K over all ephemerides within their errors.
+/// K over all ephemerides within their uncertainties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownAmplitude {
     /// Mean and standard deviation (km/s).
@@ -53,19 +53,19 @@ pub struct KnownAmplitude {
 pub struct KnownPlanets {
     /// The planets.
     pub planets: Vec<KnownPlanet>,
-    /// Frequency (orbits a rotation cycle) of another planet that was found beside them, whose orbit is left free where
-    /// K is measured.
+    /// Frequency (orbits a rotation cycle) of another planet that was detected in addition, whose orbit is free where K
+    /// is measured.
     pub companion: Option<f64>,
     /// Velocities of the star without each of the planets.
     absent: Vec<VelocityQuadratic>,
 }
 
 impl KnownPlanets {
-    /// The star `here` without them: K of each with the others' free; where a jitter is fitted, beside that of a star
-    /// that has the others.
+    /// From the star `here` without them: K of each with the others' free; where a jitter is fitted, with that of a
+    /// star that has the others.
     pub fn absent(ephemerides: &[Ephemeris], here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Self {
         KnownPlanets::of(ephemerides, |ephemeris| match (ephemerides, without_jitter) {
-            // of a single one as the star is
+            // with a single planet, the star itself
             ([_, _, ..], Some(without)) => {
                 let rest = beside(others(ephemerides, ephemeris), &without.here.quadratic);
                 without.beside_jitter(&rest).as_found().quadratic.clone()
@@ -85,8 +85,8 @@ impl KnownPlanets {
         KnownPlanets { planets: ephemerides.iter().zip(&absent).map(planet).collect(), companion: None, absent }
     }
 
-    /// The same where another planet was found at that frequency (orbits a rotation cycle): K of each, alone and by the
-    /// velocities of the star with them, with its orbit free.
+    /// The same where another planet was detected at that frequency (orbits a rotation cycle): K of each, alone and by
+    /// the velocities of the star with them, with its orbit free.
     #[must_use]
     pub fn with_companion(mut self, frequency: f64, quadratic: &VelocityQuadratic) -> Self {
         self.companion = Some(frequency);
@@ -97,12 +97,12 @@ impl KnownPlanets {
         self.present(quadratic)
     }
 
-    /// Writes their orbits into `values`, of the K that a star without them shows.
+    /// Writes their orbits into `values`, with K measured on a star without them.
     pub fn write(&self, values: &mut ParameterValues) {
         self.planets.iter().for_each(|planet| planet.ephemeris.write(planet.alone[0].max(0.0), values));
     }
 
-    /// The star `here`, at `values`, with its velocities whole: a second planet in the model was taken out of them.
+    /// The star `here`, at `values`, with its full velocities: a second planet in the model had been subtracted.
     pub fn whole(&self, mut here: Linearised, values: &ParameterValues) -> Linearised {
         let second = values.second.filter(|_| self.planets.iter().any(|planet| planet.ephemeris.planet == 1));
         if let Some(second) = second.map(|second| second.eccentric()) {
@@ -113,7 +113,7 @@ impl KnownPlanets {
         here
     }
 
-    /// The same with what the star with them says of K.
+    /// The same with K from the star that has them in the model.
     #[must_use]
     pub fn present(mut self, quadratic: &VelocityQuadratic) -> Self {
         let amplitude = |planet: &KnownPlanet| {
@@ -125,17 +125,17 @@ impl KnownPlanets {
         self
     }
 
-    /// The first planet of the config, where it is one of them: what is asked for first.
+    /// The first planet of the config, where it is one of them.
     pub fn first(&self) -> Option<&KnownPlanet> {
         self.planets.first().filter(|planet| planet.ephemeris.planet == 0)
     }
 
-    /// Velocities with the orbits of all left free; as they are where those are not bounded.
+    /// Velocities with the orbits of all free; unchanged where those are unbounded.
     pub fn beside<'a>(&self, quadratic: &'a VelocityQuadratic) -> Cow<'a, VelocityQuadratic> {
         beside(self.ephemerides(), quadratic)
     }
 
-    /// The same with the orbits of all but that planet left free, that of another that was found as well.
+    /// The same with the orbits of all but that planet free, including that of another detected planet.
     pub fn beside_others<'a>(
         &self,
         planet: &KnownPlanet,
@@ -146,8 +146,8 @@ impl KnownPlanets {
         self.companion.and_then(|at| without(&rest, at)).map_or(rest, Cow::Owned)
     }
 
-    /// The likelihood of the velocities of the star `here` with the orbits of all left free, beside the jitter and
-    /// the offsets of nights where the profiles say how large these are.
+    /// The likelihood of the velocities of the star `here` with the orbits of all free, with the jitter and nightly
+    /// offsets where these are fitted.
     pub fn jitters(&self, here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
         match without_jitter {
             Some(without) => without.beside(&self.beside(&without.here.quadratic)),
@@ -155,7 +155,7 @@ impl KnownPlanets {
         }
     }
 
-    /// The columns that are left free, profiles x amplitudes; `None` where there is no such planet.
+    /// The free columns, profiles x amplitudes; `None` where there is no such planet.
     pub fn columns(&self, cycles: &[f64]) -> Option<DMatrix<f64>> {
         columns(self.ephemerides(), cycles)
     }
@@ -164,8 +164,8 @@ impl KnownPlanets {
         self.planets.iter().map(|planet| planet.ephemeris)
     }
 
-    /// The orbit of a `planet` at its ephemeris, the others' K free, beside the jitters that `of` gives for velocities:
-    /// K may have either sign.
+    /// The orbit of a `planet` at its ephemeris, the others' K free, with the jitters that `of` gives for velocities: K
+    /// may have either sign.
     pub fn orbit_of(
         &self,
         planet: &KnownPlanet,
@@ -182,12 +182,12 @@ impl KnownPlanets {
 }
 
 impl KnownPlanet {
-    /// Whether a star without it seldom shows such a K.
+    /// Whether the false-alarm probability of K is low.
     pub fn is_candidate(&self) -> bool {
         one_sided(self.alone[0] / self.alone[1]) < CANDIDATE_FAP
     }
 
-    /// The orbit, of the K of a star with it where it is bounded.
+    /// The orbit, with K from the star that has it in the model where that is bounded.
     pub fn orbit(&self) -> CircularOrbit {
         let mut values = ParameterValues::of_eight([0.0; 8]);
         self.ephemeris.write(0.0, &mut values);
@@ -201,11 +201,11 @@ impl KnownPlanet {
         }
     }
 
-    /// The same as a peak of a search would be.
+    /// The same in the form of a peak of a search.
     pub fn peak(&self) -> Peak {
         let [period_d, sigma_d] = self.ephemeris.period_d;
         let (prot, orbit) = (self.ephemeris.clock.rotation_period_d, self.orbit());
-        // phi is counted from the epoch, over as many orbits as the conjunction is away
+        // phi is counted from the epoch, over as many orbits as lie between it and the conjunction
         let orbits = (self.ephemeris.conjunction_d[0] - self.ephemeris.clock.epoch_d) / period_d;
         let [of_period, of_phi] =
             [(sigma_d / prot).powi(2), self.ephemeris.phase_error(self.ephemeris.clock.epoch_d).powi(2)];
@@ -232,7 +232,7 @@ fn beside(ephemerides: impl Iterator<Item = Ephemeris>, quadratic: &VelocityQuad
     rest.map_or(Cow::Borrowed(quadratic), Cow::Owned)
 }
 
-/// Velocities at each ephemeris, and what a step in period and conjunction adds where they are uncertain.
+/// Velocities at each ephemeris, and their change by a step in period and conjunction where they are uncertain.
 fn columns(ephemerides: impl Iterator<Item = Ephemeris>, cycles: &[f64]) -> Option<DMatrix<f64>> {
     let mut columns: Vec<DVector<f64>> = Vec::new();
     for ephemeris in ephemerides {
@@ -254,23 +254,23 @@ fn columns(ephemerides: impl Iterator<Item = Ephemeris>, cycles: &[f64]) -> Opti
     (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
 }
 
-/// K over all ephemerides within their errors: of each, its prior and how well its orbit fits. `None` where the
-/// profiles do not bound it.
+/// K marginalised over all ephemerides within their uncertainties, each weighted by its prior and likelihood. `None`
+/// where K is unbounded.
 fn over_errors(quadratic: &VelocityQuadratic, ephemeris: &Ephemeris) -> Option<Mixture> {
     let mut parts = Vec::new();
     for (period_d, of_period) in within(ephemeris.period_d) {
         for (conjunction_d, of_conjunction) in within(ephemeris.conjunction_d) {
             let unit = ephemeris.unit_velocities_at(period_d, conjunction_d, &quadratic.cycles);
             let [mean, sd] = quadratic.amplitude(&unit);
-            // the integral over all K of how well the orbit fits
+            // the likelihood marginalised over K
             parts.push(Part { ln_weight: of_period + of_conjunction + 0.5 * (mean / sd).powi(2) + sd.ln(), mean, sd });
         }
     }
     Mixture::new(parts)
 }
 
-/// Numbers within the errors, [`REACH`] standard errors to both sides, each with ln of its prior; one where there is no
-/// error.
+/// Values within the uncertainties, [`REACH`] standard errors to both sides, each with ln of its prior; one where there
+/// is no uncertainty.
 fn within([mean, sd]: [f64; 2]) -> Vec<(f64, f64)> {
     if sd == 0.0 {
         return vec![(mean, 0.0)];
@@ -290,7 +290,7 @@ mod tests {
         Ephemeris { planet, conjunction_d, period_d: [period_d, 0.0], shape: None, clock: CLOCK }
     }
 
-    /// 30 velocities with errors of 0.05 km/s of these orbits: ephemeris and K.
+    /// 30 velocities with uncertainties of 0.05 km/s of these orbits: ephemeris and K.
     fn quadratic(orbits: &[(Ephemeris, f64)]) -> VelocityQuadratic {
         let cycles: Vec<f64> = (0..30).map(|k| 0.37 * f64::from(k)).collect();
         let information = DMatrix::identity(30, 30) / 0.05f64.powi(2);
@@ -301,8 +301,8 @@ mod tests {
         VelocityQuadratic { gradient: &information * velocities, cycles, information }
     }
 
-    /// A planet of 0.1 km/s whose conjunction comes two standard errors after the one that is given, 0.16 orbits: there
-    /// K is a half of what it is.
+    /// A planet of 0.1 km/s whose conjunction is two standard errors, 0.16 orbits, after the given one: at the given
+    /// one K is half the true value.
     #[test]
     fn an_ephemeris_that_is_off_leaves_k_as_it_is() {
         let quadratic = quadratic(&[(ephemeris(0, 5.0, [7.8, 0.0]), 0.1)]);
@@ -316,7 +316,7 @@ mod tests {
         let [alone, _] = over_errors(&quadratic, &known).unwrap().moments();
         assert!((alone - there).abs() < 1e-12);
         assert!(k.upper95() > 0.11 && k.upper95() < 0.14, "{}", k.upper95());
-        // what the error adds is left free: no orbit remains
+        // the effect of the error is free: no orbit remains
         let known = KnownPlanets::of(&[given], |_| quadratic.clone());
         let rest = known.beside(&quadratic);
         let left = rest.gradient.norm() / quadratic.gradient.norm();
@@ -338,7 +338,7 @@ mod tests {
         }
     }
 
-    /// A planet that moves the star the other way has no height.
+    /// A negative K has height 0.
     #[test]
     fn a_negative_k_is_no_planet() {
         let planet = ephemeris(0, 5.0, [7.0, 0.0]);
@@ -349,7 +349,7 @@ mod tests {
         assert_eq!(known.planets[0].orbit().delta_ln_l, 0.0);
     }
 
-    /// Beside another planet, of which nothing was known, K is as it is.
+    /// K is unbiased with another, unknown planet.
     #[test]
     fn k_is_measured_beside_a_companion() {
         let (b, c) = (ephemeris(0, 5.0, [7.0, 0.0]), ephemeris(1, 9.1, [3.0, 0.0]));
@@ -361,7 +361,7 @@ mod tests {
         assert!((beside.planets[0].alone[0] - 0.06).abs() < 1e-9);
     }
 
-    /// Two planets at once: K of each as it is, and nothing is left beside them; alone, each takes a part of the other.
+    /// Two planets at once: K of each is unbiased, and nothing remains; alone, each absorbs a part of the other.
     #[test]
     fn two_known_planets_do_not_take_from_each_other() {
         let (b, c) = (ephemeris(0, 5.0, [7.0, 0.0]), ephemeris(1, 9.1, [3.0, 0.0]));

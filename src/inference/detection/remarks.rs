@@ -1,5 +1,4 @@
-//! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the
-//! verdict.
+//! The results of a blind search in words: caveats, other remarks, and the verdict.
 
 use super::{Detection, DetectionSettings, KnownPlanet, Robustness, WithoutNight};
 use crate::model::Parameter;
@@ -10,36 +9,36 @@ use crate::planets::periodogram::peaks::posterior_shares;
 use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals, speed};
 use crate::surface::imaging::Imager;
 
-/// Fewer profiles than this hardly tell how large the unresolved spots are.
+/// Fewer profiles than this hardly constrain the unresolved-spot noise.
 const FEW: usize = 12;
 
-/// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
+/// The systemic velocity may be wrong when another one raises ln L by this much: 5 standard deviations.
 const OFFSET_GAIN: f64 = 12.5;
 
 /// Delta ln L of a known planet whose false-alarm probability is 1 %: 2.33 standard errors, one-sided.
 const KNOWN_LEVEL: f64 = 2.706;
 
-/// A K of a known planet that is below zero by so many standard errors is worth a word.
+/// A K of a known planet that is this many standard errors below zero is reported.
 const NEGATIVE: f64 = 2.0;
 
-/// Other peaks that may be the true one, as many as are named.
+/// Largest number of other possibly true peaks that are named.
 const RIVALS_NAMED: usize = 3;
 
-/// Nights on which a signal depends, as many as are named.
+/// Largest number of nights that are named as driving a signal.
 const NIGHTS_NAMED: usize = 3;
 
-/// What a search is judged by beside itself.
+/// Other inputs of a verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
-    /// What the data were imaged with.
+    /// The surface model of the images.
     pub imager: &'a Imager,
-    /// How it was asked for.
+    /// The settings of the search.
     pub settings: &'a DetectionSettings,
-    /// Whether the best orbit depends on target or nights, where that was tried.
+    /// Whether the best orbit depends on target or nights, where that was tested.
     pub robustness: Option<&'a Robustness>,
-    /// What RV offsets of nights make of the best orbit.
+    /// Effect of nightly RV offsets on the best orbit.
     pub night_offsets: Option<NightOffsets>,
-    /// What is not like noise in the residuals of the last image.
+    /// Deviations from noise in the residuals of the last image.
     pub misfit: &'a [String],
 }
 
@@ -54,7 +53,7 @@ impl Detection {
         }
     }
 
-    /// What an orbit at the rotation period is up against.
+    /// The degeneracy with spots at the rotation period.
     pub fn co_rotation(&self) -> String {
         match self.co_rotation_penalty {
             Some(ratio) if ratio > 1.1 => {
@@ -65,12 +64,12 @@ impl Detection {
         }
     }
 
-    /// All that has to be said, what speaks against a planet with the rest.
+    /// All remarks, caveats included.
     pub fn remarks(&self, evidence: &Evidence) -> Vec<Remark> {
         [self.of_the_star(evidence), self.of_the_best_orbit(evidence), self.of_the_search()].concat()
     }
 
-    /// What is to be said of the star, whatever its planets.
+    /// Remarks on the star, whatever its planets.
     pub fn of_the_star(&self, evidence: &Evidence) -> Vec<Remark> {
         let mut remarks = evidence.settings.surface.model().remarks(evidence.imager, self.last());
         let misfit = |text: &String| Remark::against("residuals inconsistent with noise", text);
@@ -82,8 +81,7 @@ impl Detection {
         remarks
     }
 
-    /// What is to be said of the highest peak: its period, whether it depends on a choice that was tried, and what RV
-    /// offsets of nights make of it.
+    /// Remarks on the highest peak: its period, its dependence on tested choices, and the effect of nightly RV offsets.
     pub fn of_the_peak(&self, robustness: Option<&Robustness>, night_offsets: Option<NightOffsets>) -> Vec<Remark> {
         let mut remarks = if self.is_candidate() { self.of_the_period() } else { Vec::new() };
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
@@ -98,7 +96,7 @@ impl Detection {
         remarks
     }
 
-    /// What is to be said of the best orbit.
+    /// Remarks on the best orbit.
     fn of_the_best_orbit(&self, evidence: &Evidence) -> Vec<Remark> {
         if let Some(planet) = self.known.first() {
             let mut remarks = of_choices(evidence.robustness, planet.orbit().delta_ln_l, KNOWN_LEVEL);
@@ -117,7 +115,7 @@ impl Detection {
         remarks
     }
 
-    /// That the star moves as if the planet were on the other side.
+    /// The remark on a negative K.
     fn of_negative(&self, planet: &KnownPlanet) -> Option<Remark> {
         let [k_kms, sigma_k_kms] = planet.alone;
         let sigmas = -k_kms / sigma_k_kms;
@@ -129,7 +127,7 @@ impl Detection {
         })
     }
 
-    /// What else has to be known of the search.
+    /// Other remarks on the search.
     fn of_the_search(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let shortest = self.frequencies.rotation_period_d / self.frequencies.range().1;
@@ -148,7 +146,7 @@ impl Detection {
         remarks
     }
 
-    /// What the profiles lack.
+    /// Remarks on limitations of the profiles.
     fn of_the_data(&self, evidence: &Evidence) -> Vec<Remark> {
         let Evidence { imager, settings, .. } = *evidence;
         let mut remarks = Vec::new();
@@ -183,7 +181,7 @@ impl Detection {
         remarks
     }
 
-    /// Whether the star changes though it is taken for one that does not.
+    /// Whether the spots evolve although a static map is assumed.
     fn of_the_change(&self) -> Option<Remark> {
         match self.change.as_ref()? {
             Ok(change) => change.is_changing().then(|| Remark::against("spot evolution", change.sentence())),
@@ -194,7 +192,7 @@ impl Detection {
         }
     }
 
-    /// Whether the best period is the one of the planet.
+    /// Remarks on ambiguities of the best period.
     pub fn of_the_period(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
         if let Some(imitation) = self.highest().imitation {
@@ -234,7 +232,7 @@ impl Detection {
         peaks.iter().zip(shares).map(of).collect()
     }
 
-    /// Peaks that may as well be the true one, the likeliest first, where the highest has a share that leaves room.
+    /// Other possibly true peaks, the most probable first, where the share of the highest is small enough.
     fn rivals(&self) -> Vec<(&Peak, f64)> {
         let peaks: Vec<&Peak> = self.blind.peaks.iter().collect();
         let shares = posterior_shares(&peaks);
@@ -258,7 +256,7 @@ impl Detection {
     }
 }
 
-/// Whether an orbit of that `height` depends on a choice; a candidate's is `level` at least.
+/// Whether an orbit of that `height` depends on a tested choice; that of a candidate is at least `level`.
 fn of_choices(robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<Remark> {
     let Some(robustness) = robustness else { return Vec::new() };
     let mut remarks = Vec::new();
@@ -285,6 +283,7 @@ fn of_choices(robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<R
     remarks
 }
 
+<<<<<<< HEAD
 /// That a signal is not significant without whichever of many nights, though its K stays.
 fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Option<Remark> {
     let orbits = || robustness.nights.iter().filter_map(|night| night.orbit);
@@ -304,6 +303,9 @@ fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Op
 }
 
 /// That a signal is not significant beside such offsets.
+=======
+/// That a signal is not significant with such offsets.
+>>>>>>> words
 pub fn of_night_offsets(NightOffsets { sigma_kms, false_alarm_probability, .. }: NightOffsets) -> Option<Remark> {
     (false_alarm_probability > CANDIDATE_FAP).then(|| {
         Remark::against(
@@ -318,7 +320,7 @@ pub fn of_night_offsets(NightOffsets { sigma_kms, false_alarm_probability, .. }:
     })
 }
 
-/// That a signal depends on these nights, each by itself.
+/// That a signal depends on each of these nights.
 fn decided(nights: &[&WithoutNight]) -> Option<Remark> {
     let name = |night: &&WithoutNight| {
         let profiles = if night.profiles == 1 { "profile" } else { "profiles" };

@@ -1,8 +1,8 @@
-//! Whether the best orbit hangs on a choice: K at a target chi2 3 % lower and higher, and without the profiles of each
-//! night.
+//! Whether the best orbit depends on a choice: K at a target chi2 3 % lower and higher, and without the profiles of
+//! each night.
 //!
-//! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
-//! target, or of the profiles that remain. Where maps are integrated over, profiles are taken out of the evidence.
+//! Every K is a closed form at the best period, around a new image at the best orbit: with the other target, or of the
+//! remaining profiles. Under a marginal likelihood, profiles are removed from the evidence instead.
 
 use super::{Detection, DetectionSettings, KnownPlanet};
 use crate::model::{Parameter, ParameterValues};
@@ -19,10 +19,10 @@ use serde::{Deserialize, Serialize};
 /// Fewest profiles that must remain without a night.
 const FEWEST: usize = 5;
 
-/// More than this part of an error bar between targets is worth a warning.
+/// A difference between targets above this fraction of the standard error gives a warning.
 const MOVES: f64 = 0.5;
 
-/// K changes by more than that many times what leaving out so many profiles does by chance.
+/// K changes significantly if by more than this many times the change expected from leaving out as many profiles.
 const SURPRISE: f64 = 3.0;
 
 /// The orbit without one night.
@@ -39,12 +39,12 @@ pub struct WithoutNight {
     pub delta_ln_p: Option<f64>,
 }
 
-/// Whether nights that are held out are predicted better with the planet.
+/// Whether held-out nights are predicted better with the planet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Sum of the Delta ln p of all nights; above 0 where the planet predicts them better.
     pub delta_ln_p: f64,
-    /// Its standard deviation, by the scatter of the nights.
+    /// Its standard deviation, from the scatter between nights.
     pub sigma_delta_ln_p: f64,
     /// Number of nights.
     pub nights: usize,
@@ -53,25 +53,25 @@ pub struct HeldOut {
 /// The best orbit under other choices, its period kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robustness {
-    /// At the target asked for, and all nights.
+    /// At the configured target, with all nights.
     pub all: Option<CircularOrbit>,
-    /// With the target a little lower, as it is, and a little higher.
+    /// With the target a little lower, unchanged, and a little higher.
     pub targets: Vec<AtTarget>,
     /// Without each night, in order of time; empty if the profiles are of one night, or too few.
     pub nights: Vec<WithoutNight>,
 }
 
-/// The orbit that is tried out.
+/// The orbit to test.
 #[derive(Clone, Copy, Debug)]
 pub enum Tried<'a> {
-    /// A peak of the search: its period is kept.
+    /// A peak of the search: its period is fixed.
     Peak(&'a Peak),
-    /// That of a known planet: all but K is kept.
+    /// That of a known planet: all but K is fixed.
     Known(&'a KnownPlanet),
 }
 
 impl Tried<'_> {
-    /// It beside the jitters that `of` gives for velocities.
+    /// The orbit with the jitters that `of` gives for velocities.
     fn beside(&self, found: &Detection, q: &VelocityQuadratic, of: &dyn Fn(&VelocityQuadratic) -> Jitters) -> Fitted {
         match self {
             Tried::Peak(peak) => of(&found.known.beside(q)).orbit_at(1.0 / peak.porb_over_prot),
@@ -95,8 +95,8 @@ impl Tried<'_> {
 /// An orbit, where one is bounded.
 type Fitted = Option<CircularOrbit>;
 
-/// Tries an orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets, and
-/// without a night the field, and the maps around which profiles are linear, are those found last.
+/// Tests an orbit of `found`, with all other parameters from `values`. Under a marginal likelihood there are no
+/// targets; without a night the field and the expansion point are the last ones.
 pub fn robustness(
     imager: &Imager,
     mut values: ParameterValues,
@@ -127,7 +127,7 @@ pub fn robustness(
     let (surface, at) = (settings.surface.model(), At { imager, values, nuisances: &settings.nuisances });
     let targets = surface.at_other_targets(at, &orbit);
     let without = surface.without_each(at, found.last(), &nights, &orbit);
-    // Delta ln L is that of the blind search: around a star without a planet, beside the jitter that is found there
+    // Delta ln L is that of the blind search: around a star without a planet, with the jitter found there
     let alone = At { values: alone, ..at };
     let star = found.without_jitter.as_ref().map_or(&found.planet_free, |without| &without.here);
     let of_all = &*match tried {
@@ -136,7 +136,7 @@ pub fn robustness(
     };
     let of_all = match (&found.without_jitter, tried) {
         (Some(star), Tried::Peak(_)) => star.beside(of_all),
-        // what offsets of nights make of it is said beside
+        // the effect of nightly offsets is reported separately
         (Some(star), Tried::Known(_)) => star.beside_jitter(of_all),
         (None, _) => Jitters::none(of_all),
     };
@@ -173,8 +173,8 @@ pub fn robustness(
 }
 
 impl Detection {
-    /// What RV offsets of nights, larger than the search counts, make of the highest peak, if it is a candidate beside
-    /// a fitted jitter.
+    /// Effect of nightly RV offsets beyond the range of the search on the highest peak, if it is a candidate with a
+    /// fitted jitter.
     pub fn peak_beside_nights(&self, settings: SearchSettings) -> Option<NightOffsets> {
         let star = self.without_jitter.as_ref().filter(|_| self.is_candidate())?;
         let velocities = self.known.beside(&star.here.quadratic);
@@ -184,7 +184,7 @@ impl Detection {
         Some(found).filter(|found| found.sigma_kms > self.blind.false_alarm.night_kms)
     }
 
-    /// The same of a known planet that would be one: as its significance, by the star without it.
+    /// The same for a known planet that would be a candidate: like its significance, from the star without it.
     pub fn known_beside_nights(&self, planet: &KnownPlanet, settings: SearchSettings) -> Option<NightOffsets> {
         let alone = self.alone.as_ref().filter(|_| planet.is_candidate())?;
         let star = alone.without_jitter.as_ref()?;
@@ -210,7 +210,7 @@ impl Robustness {
         (nights > 1).then_some(HeldOut { delta_ln_p: sum, sigma_delta_ln_p, nights })
     }
 
-    /// By how many of its errors K differs between targets, where that is worth a warning.
+    /// Difference of K between targets in standard errors, where large enough for a warning.
     pub fn target_matters(&self) -> Option<f64> {
         let orbits: Vec<CircularOrbit> = self.targets.iter().filter_map(|at| at.orbit).collect();
         let middle = self.all?;
@@ -219,13 +219,21 @@ impl Robustness {
         (largest > MOVES).then_some(largest)
     }
 
+<<<<<<< HEAD
     /// Nights that make the result: without which K moves by more than the profiles left out explain, and others without
     /// which ln L of the orbit falls below `level`, where it was above.
     pub fn decisive_nights(&self, level: f64) -> [Vec<&WithoutNight>; 2] {
         let Some(all) = self.all else { return [Vec::new(), Vec::new()] };
         let moves = |night: &&WithoutNight| {
+=======
+    /// Nights that drive the result: without one, ln L of the orbit falls below `level`, or K moves by more than
+    /// expected from the number of profiles left out.
+    pub fn decisive_nights(&self, level: f64) -> Vec<&WithoutNight> {
+        let Some(all) = self.all else { return Vec::new() };
+        let decides = |night: &&WithoutNight| {
+>>>>>>> words
             night.orbit.is_none_or(|orbit| {
-                // of nested data, the variance of the difference is that of the variances
+                // for nested data the variance of the difference is the difference of the variances
                 let by_chance = (orbit.sigma_k_kms.powi(2) - all.sigma_k_kms.powi(2)).max(0.0).sqrt();
                 (orbit.k_kms - all.k_kms).abs() > SURPRISE * by_chance.max(0.3 * all.sigma_k_kms)
             })

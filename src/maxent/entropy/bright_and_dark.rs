@@ -1,12 +1,12 @@
 //! Entropy of an image of brightnesses above and below that of the photosphere (`docs/method.md` section 2, Gull &
 //! Skilling 1999): `S(B) = - sum_p a_p [ B ln(B/m) - B + m ]` with the default m = 1: profiles are divided by their
-//! continuum, and say nothing of the scale of B.
+//! continuum, and do not constrain the scale of B.
 //!
 //! The coordinate is `u = ln B`, which keeps B above 0. Spottedness is the root mean square of `B - 1` over the
-//! surface. Its mean modulus would be nearer to the coverage of spots, but is traded for chi2 less faithfully: on the
+//! surface. The mean modulus would be closer to the coverage of spots, but is a worse proxy of the likelihood: on the
 //! paper's star with faculae, two standard errors of K from the optimum, ln L by the root mean square is within 4 % of
 //! the regularised likelihood, by the mean modulus within 22 % (softened at 0.003 to 0.1: 12 to 21 %), because -S is
-//! the mean square to lowest order. It has no kink either.
+//! the mean square to lowest order. It also has no kink.
 
 use super::pixels::{Pixel, spottedness};
 use crate::numerics::vector::Instructions;
@@ -17,7 +17,7 @@ use crate::numerics::vector::elementary::{exp_minus, ln_1p_single};
 pub(super) struct Brightness;
 
 impl Pixel for Brightness {
-    /// A pixel that bright outshines, and one that dark is nothing beside, all the others.
+    /// A pixel this bright outshines all others, and one this dark is negligible.
     const LIMIT: f64 = 30.0;
 
     #[inline(always)]
@@ -42,7 +42,7 @@ impl Pixel for Brightness {
         [b as f32, f32::INFINITY]
     }
 
-    /// Exact up to half of a pixel's brightness taken away, beyond that along the tangent.
+    /// Exact down to half of a pixel's brightness, beyond that along the tangent.
     #[inline(always)]
     fn step(self, i: impl Instructions, [b, _]: [f32; 2], db: f32) -> f32 {
         let relative = db / b;
@@ -62,12 +62,12 @@ pub(super) fn metric(b: f64, area: f64) -> f32 {
     (b as f32 / area as f32).sqrt()
 }
 
-/// Gain by a change of the logarithm: the divergence of the two images.
+/// Gain from a change of the logarithm: the divergence of the two images.
 pub(super) fn gain(u: f64, change: f64) -> f64 {
     u.exp() * (change.exp_m1() - change)
 }
 
-/// Gradient of the spottedness with respect to B; nought at the default, where it has none.
+/// Gradient of the spottedness with respect to B; 0 at the default, where it has none.
 pub(super) fn spottedness_gradient(b: &[f64], area: &[f64]) -> Vec<f64> {
     let size = spottedness::<Brightness>(b, area).max(f64::MIN_POSITIVE);
     b.iter().zip(area).map(|(b, a)| a * (b - 1.0) / size).collect()

@@ -1,4 +1,4 @@
-//! Entropies of images, by what an image holds (`docs/method.md` section 2): filling factors of dark spots (`spots`),
+//! Entropies of images, by content of the image (`docs/method.md` section 2): filling factors of dark spots (`spots`),
 //! or brightnesses above and below that of the photosphere (`bright_and_dark`).
 //!
 //! The solver works in a coordinate u of each pixel that keeps the image inside its domain, and measures steps in the
@@ -27,7 +27,7 @@ pub enum Entropy {
     BrightAndDark,
 }
 
-/// What an image is worth.
+/// Entropy and spottedness of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worth {
     /// Entropy: at most 0, and 0 at the default.
@@ -47,7 +47,7 @@ pub struct MetricStep<'a> {
     pub z: &'a [f32],
     /// ... the scale of the metric, ...
     pub scale: &'a [f32],
-    /// ... and how far it is to go.
+    /// ... and its length.
     pub length: f32,
     /// Largest change of a coordinate.
     pub cap: f32,
@@ -59,8 +59,8 @@ impl Entropy {
         Entropy::Spots { default_logit: (default_spot / (1.0 - default_spot)).ln() }
     }
 
-    /// About how large the Lagrange multipliers of images of some data are, in units of those of spots: on the paper's
-    /// star, with and without faculae, at chi2 = 0.97 per datum.
+    /// Typical Lagrange multipliers of images, in units of those of spots: on the paper's star, with and without
+    /// faculae, at chi2 = 0.97 per datum.
     pub fn lambda_unit(&self) -> f64 {
         match self {
             Entropy::Spots { .. } => 1.0,
@@ -76,8 +76,7 @@ impl Entropy {
         }
     }
 
-    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there. The upper bound is as far
-    /// from 0.
+    /// Lower bound of the coordinates for steps: the image is practically 0 there. The upper bound is symmetric.
     pub fn lowest_coordinate(&self) -> f64 {
         match self {
             Entropy::Spots { .. } => -Filling::LIMIT,
@@ -103,7 +102,7 @@ impl Entropy {
         }
     }
 
-    /// Takes a step: coordinates and image there, and what they are worth.
+    /// Takes a step: coordinates, image, entropy and spottedness there.
     pub fn advance(&self, step: MetricStep, area: &[f64], u: &mut [f64], image: &mut [f64]) -> Worth {
         match *self {
             Entropy::Spots { default_logit } => {
@@ -113,7 +112,7 @@ impl Entropy {
         }
     }
 
-    /// What the image with coordinates `u` is worth, and the image itself.
+    /// Entropy and spottedness of the image with coordinates `u`, and the image itself.
     pub fn value(&self, u: &[f64], area: &[f64], image: &mut [f64]) -> Worth {
         match *self {
             Entropy::Spots { default_logit } => {
@@ -130,8 +129,8 @@ impl Entropy {
         combined(u, area, |u, area| area * (u - default))
     }
 
-    /// Scale of the metric: a step z in it is the image step `scale * z`. Single precision suffices for coordinates to
-    /// take steps in.
+    /// Scale of the metric: a step z in it is the image step `scale * z`. Single precision is enough for the
+    /// coordinates of steps.
     pub fn metric(&self, image: &[f64], area: &[f64]) -> Vec<f32> {
         let mut scale = vec![0.0; image.len()];
         match self {
@@ -143,7 +142,7 @@ impl Entropy {
         scale
     }
 
-    /// What a pixel gains, per area, by a change of its coordinate from `u` to the best for a misfit that is linear in
+    /// Gain of a pixel, per area, from a change of its coordinate from `u` to the best for a misfit that is linear in
     /// the image.
     pub fn gain(&self, u: f64, change: f64) -> f64 {
         match self {

@@ -1,13 +1,13 @@
-//! Values and steps of an image, pixel by pixel, as its entropy has them.
+//! Values and steps of an image, pixel by pixel, for its entropy.
 
 use super::{MetricStep, Worth};
 use crate::numerics::vector::linear::short_dot;
 use crate::numerics::vector::{Instructions, Task};
 
-/// Pixels whose terms are summed at a time.
+/// Pixels per partial sum.
 const CHUNK: usize = 512;
 
-/// An entropy, as one pixel has it.
+/// The entropy of one pixel.
 pub(super) trait Pixel: Copy {
     /// Largest |u|.
     const LIMIT: f64;
@@ -15,21 +15,21 @@ pub(super) trait Pixel: Copy {
     /// The image at coordinate `u`, and its -S per area; to be marked `#[inline(always)]`, as is the step.
     fn value(self, i: impl Instructions, u: f64) -> (f64, f64);
 
-    /// What a pixel adds, per area, to the sum of which spottedness is a function.
+    /// Contribution of a pixel, per area, to the sum of which spottedness is a function.
     fn spot(x: f64) -> f64;
 
     /// Spottedness by that sum.
     fn spottedness(sum: f64) -> f64;
 
-    /// The image in single precision, and what it lacks of the end of its domain.
+    /// The image in single precision, and its distance from the end of its domain.
     fn in_single(x: f64) -> [f32; 2];
 
-    /// Change of the coordinate that moves the image by `dx`, if that is no great part of the way to the end of its
-    /// domain.
+    /// Change of the coordinate that moves the image by `dx`, if that is a small fraction of the distance to the end of
+    /// its domain.
     ///
-    /// Data are nearly linear in the image, so that a step straight in it keeps what the stiff directions have gained;
-    /// a step straight in the coordinate, equal to first order, would undo it to second order. To single precision:
-    /// where a step leads is computed anew.
+    /// Data are nearly linear in the image, so that a step straight in it preserves the gain in the stiff directions; a
+    /// step straight in the coordinate, equal to first order, would lose it at second order. In single precision, since
+    /// the new image is recomputed.
     fn step(self, i: impl Instructions, image: [f32; 2], dx: f32) -> f32;
 }
 
@@ -76,8 +76,8 @@ impl<P: Pixel> Task for Step<'_, P> {
     }
 }
 
-/// A step in the metric, and image, entropy and spottedness where it leads to: a chunk of pixels after another, because
-/// most of the time goes into fetching them.
+/// A step in the metric, and image, entropy and spottedness after it: in chunks of pixels, because most of the time is
+/// spent in fetching them.
 pub(super) struct Advance<'a, P> {
     pub pixel: P,
     pub step: MetricStep<'a>,
@@ -112,7 +112,7 @@ pub(super) fn spottedness<P: Pixel>(image: &[f64], area: &[f64]) -> f64 {
     P::spottedness(image.iter().zip(area).map(|(x, area)| area * P::spot(*x)).sum())
 }
 
-/// Adds -S and what spottedness is a function of to two sums, for at most [`CHUNK`] pixels.
+/// Adds to the two sums of -S and of spottedness, for at most [`CHUNK`] pixels.
 #[inline(always)]
 fn add_values<P: Pixel>(
     i: impl Instructions,

@@ -40,7 +40,7 @@ impl Pixel for Filling {
         s
     }
 
-    /// The part of the surface that is covered.
+    /// The covered fraction of the surface.
     fn spottedness(covered: f64) -> f64 {
         covered
     }
@@ -59,13 +59,13 @@ impl Pixel for Filling {
         // one division for two, of a product that vanishes where the default is nearer to 0 than pixels may be
         let (here, there) = (s * left, there * left);
         let per_both = 1.0 / (here * there).max(f32::MIN_POSITIVE);
-        // next to s = 1 rounding makes -1 of it, or less
+        // close to s = 1 rounding makes it -1, or less
         let relative = (straight * (there * per_both)).max(LOWEST_RELATIVE);
         ln_1p_single(i, relative) + (ds - straight) * (here * per_both)
     }
 }
 
-/// Its logarithm is a change beyond any that a step may make.
+/// Its logarithm is a change beyond that of any step.
 const LOWEST_RELATIVE: f32 = -0.99;
 
 /// The image s.
@@ -79,7 +79,7 @@ pub(super) fn metric(s: f64, area: f64) -> f32 {
     ((s * (1.0 - s)) as f32 / area as f32).sqrt()
 }
 
-/// Gain by a change of the logit: the divergence of the two images.
+/// Gain from a change of the logit: the divergence of the two images.
 pub(super) fn gain(u: f64, change: f64) -> f64 {
     softplus(u + change) - softplus(u) - change / (1.0 + (-u).exp())
 }

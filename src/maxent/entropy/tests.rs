@@ -39,7 +39,7 @@ fn value_is_the_formula() {
     }
 }
 
-/// Differences over a step of 1e-4 are good to its square over that of the pixel's value.
+/// Differences over a step of 1e-4 are accurate to the square of the step over that of the pixel's value.
 #[test]
 fn gradient_and_metric_are_its_derivatives() {
     for (entropy, u) in MODELS {
@@ -144,7 +144,7 @@ fn steps_are_straight_in_the_image_as_long_as_they_are_small() {
             let off = |p: usize| (there[p] - map[p]) / f64::from(step[p]) - 1.0;
             assert!((0..4).all(|p| off(p).abs() < 1e-6), "{entropy:?} {part}");
         }
-        // what would lead out of the domain does not
+        // steps out of the domain are limited
         for step in [-1e9, 1e9] {
             entropy.step(&u, &map, &[step; 4], 2.0, &mut moved);
             assert!((0..4).all(|p| ((moved[p] - u[p]).abs() - 2.0).abs() < 1e-12 && (moved[p] > u[p]) == (step > 0.0)));

@@ -1,4 +1,4 @@
-//! Eigenvectors in whole numbers: a unit for each of them, and pixels side by side.
+//! Eigenvectors as integers: one unit for each, and pixels contiguous.
 //!
 //! An application reads every entry twice, and waits for memory: two bytes or one instead of four
 //! (`results/performance.md`).
@@ -9,32 +9,32 @@ use nalgebra::DMatrix;
 /// Eigenvectors on some of the pixels.
 #[derive(Clone, Debug)]
 pub struct Rows<W> {
-    /// The pixels, and others, whose rows are zero, to make their number a multiple of [`LANES`].
+    /// The pixels, padded with zero rows to a multiple of [`LANES`].
     pixels: Vec<u32>,
-    /// How many of them are not there to fill up.
+    /// Their number without padding.
     pub(super) active: usize,
-    /// Of [`LANES`] pixels after [`LANES`] pixels, every eigenvector.
+    /// For each block of [`LANES`] pixels, every eigenvector.
     rows: Vec<Row<W>>,
     /// Unit in which each eigenvector is written.
     units: Vec<f32>,
 }
 
-/// Pixels side by side: four of the widest registers, so that a sum over pixels is stored once for four products, and
-/// sums over eigenvectors do not wait for each other.
+/// Pixels per block: four of the widest registers, so that a sum over pixels is stored once for four products, and sums
+/// over eigenvectors do not wait for each other.
 const LANES: usize = 64;
 
-/// Rows from the one at work to the one that is asked for.
+/// Rows between the current one and the prefetched one.
 const AHEAD: usize = 24;
 
-/// Sums over pixels that are kept apart.
+/// Independent sums over pixels.
 const PARTS: usize = 16;
 
-/// What an eigenvector has on pixels side by side, in whole units.
+/// Entries of an eigenvector on a block of pixels, in integer units.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Row<W>([W; LANES]);
 
-/// Nothing on no pixels.
+/// Empty.
 impl<W> Default for Rows<W> {
     fn default() -> Self {
         Rows { pixels: Vec::new(), active: 0, rows: Vec::new(), units: Vec::new() }
@@ -42,11 +42,11 @@ impl<W> Default for Rows<W> {
 }
 
 impl<W: Whole> Rows<W> {
-    /// Of the columns of `vectors` what they have on these pixels.
+    /// The entries of the columns of `vectors` on these pixels.
     pub fn new(vectors: &DMatrix<f64>, mut pixels: Vec<u32>) -> Self {
         pixels.sort_unstable();
         let (active, rank) = (pixels.len(), vectors.ncols());
-        // a number that is not finite is none in units of anything: the unit shows it
+        // a non-finite entry makes the unit non-finite
         let units = vectors.column_iter().map(|vector| {
             let numbers = pixels.iter().map(|p| vector[*p as usize].abs());
             match numbers.clone().all(f64::is_finite) {
@@ -66,18 +66,18 @@ impl<W: Whole> Rows<W> {
         Rows { pixels, active, rows, units }
     }
 
-    /// Bytes that they take in memory, all but a few.
+    /// Approximate size in memory (bytes).
     pub fn bytes(&self) -> usize {
         size_of_val(&self.rows[..])
     }
 
-    /// Pixels side by side and what every eigenvector has there.
+    /// A block of pixels with the entries of every eigenvector.
     #[inline(always)]
     fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Row<W>])> {
         self.pixels.as_chunks::<LANES>().0.iter().zip(self.rows.chunks_exact(self.units.len().max(1)))
     }
 
-    /// The eigenvectors as they are written here, a pixel in each row.
+    /// The rounded eigenvectors, one pixel per row.
     fn rounded(&self) -> DMatrix<f64> {
         let rank = self.units.len();
         DMatrix::from_fn(self.active, rank, |i, k| {
@@ -106,7 +106,7 @@ impl<W: Whole> Rows<W> {
     }
 }
 
-/// Whole numbers of which rows are made.
+/// Integers of which rows consist.
 pub trait Whole: Copy + Default + Into<f64> {
     /// The largest of them.
     const LARGEST: f64;
@@ -114,7 +114,7 @@ pub trait Whole: Copy + Default + Into<f64> {
     /// The nearest to a number.
     fn nearest(x: f64) -> Self;
 
-    /// Those from entry `first` on, side by side.
+    /// Those from entry `first` on.
     fn load<I: Instructions>(i: I, from: &[Self], first: usize) -> <I::Broad as Registers>::Lanes;
 }
 
@@ -144,7 +144,7 @@ impl Whole for i8 {
     }
 }
 
-/// Sums on a cache line of their own.
+/// Sums aligned to a cache line.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Sums([f32; PARTS]);
@@ -236,7 +236,7 @@ mod tests {
     use nalgebra::DVector;
 
     impl<W: Whole> Rows<W> {
-        /// The eigenvectors on all of `n` pixels, as they are written here.
+        /// The eigenvectors on all of `n` pixels, as rounded here.
         pub fn on_all(&self, n: usize) -> DMatrix<f64> {
             let (rounded, mut vectors) = (self.rounded(), DMatrix::zeros(n, self.units.len()));
             rounded.row_iter().zip(&self.pixels).for_each(|(row, p)| vectors.set_row(*p as usize, &row));
@@ -253,7 +253,7 @@ mod tests {
         }
     }
 
-    /// What is left of `r` without a combination of the eigenvectors.
+    /// `r` minus a combination of the eigenvectors.
     struct Without<'a, W> {
         basis: &'a Rows<W>,
         components: &'a [f32],
@@ -272,7 +272,7 @@ mod tests {
         }
     }
 
-    /// Holds components along vectors, and what is left without them, to plain products.
+    /// Compares components along vectors, and the remainder, with plain products.
     fn check<W: Whole>(vectors: &DMatrix<f64>, basis: &Rows<W>) {
         let r = DVector::from_fn(vectors.nrows(), |i, _| (0.3 * i as f64).cos());
         let (wanted, r) = (vectors.transpose() * &r, r.as_slice());
@@ -287,7 +287,7 @@ mod tests {
         assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
         let along: Vec<f32> = components[0].iter().zip(&basis.units).map(|(c, unit)| c * unit).collect();
         let combined = basis.on_all(r.len()) * DVector::from_fn(along.len(), |k, _| f64::from(along[k]));
-        // rows of whole numbers: their components have the units
+        // rows of integers: their components have the units
         let in_units: Vec<f32> = along.iter().zip(&basis.units).map(|(c, unit)| c * unit).collect();
         let left = vector::by_each(|| Without { basis, components: &in_units, r });
         for left in &left {

@@ -29,7 +29,7 @@ fn inverts_a_low_rank_system() {
 #[test]
 fn maps_that_are_not_mixed_are_inverted_each_by_itself() {
     let n = 60;
-    // of the second map everything is three times as strong
+    // for the second map everything is three times as strong
     let of_map = |v: &[f64], out: &mut [f64], times: f64| {
         out.iter_mut().zip(v).enumerate().for_each(|(p, (out, v))| *out = times * (-0.1 * p as f64).exp() * v);
     };
@@ -57,7 +57,7 @@ fn maps_that_are_not_mixed_are_inverted_each_by_itself() {
 
 #[test]
 fn the_basis_is_orthonormal_whatever_the_operator() {
-    // eigenvalues over so many decades, down to those that rounding errors drown
+    // eigenvalues over many decades, down to the level of rounding errors
     for decades in [1.0, 5.0, 20.0, 60.0] {
         let apply = |v: &[f64], out: &mut [f64]| {
             for (i, (out, v)) in out.iter_mut().zip(v).enumerate() {
@@ -110,12 +110,12 @@ fn any_rank_on_any_number_of_pixels() {
     }
 }
 
-/// Number of pixels on which the eigenvectors live.
+/// Number of pixels with entries of the eigenvectors.
 fn active_pixels(basis: &Basis) -> usize {
     basis.spotted.active + basis.faint.active
 }
 
-/// Orthonormal columns that live on all pixels.
+/// Orthonormal columns with entries on all pixels.
 pub(super) fn orthonormal(n: usize, rank: usize) -> DMatrix<f64> {
     DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin()).qr().q()
 }

@@ -48,7 +48,7 @@ fn jacobian_is_the_determinant() {
     assert!((m.determinant().abs().ln() + space.log_jacobian(&theta)).abs() < 1e-6);
 }
 
-/// Two ellipses: there and back, with the determinant of the change by differences.
+/// Two Keplerian orbits: round trip, with the determinant of the Jacobian by differences.
 #[test]
 fn ellipses_and_second_planets_have_coordinates_of_their_own() {
     use Parameter::{K, K2, Phi, Phi2, PorbOverProt, PorbOverProt2, SqrtECosOmega, SqrtESinOmega};
@@ -100,7 +100,7 @@ fn ellipses_and_second_planets_have_coordinates_of_their_own() {
     assert_eq!(space.log_prior(&crossing), f64::NEG_INFINITY);
 }
 
-/// An ephemeris in days is the same orbit with the same density, but for units.
+/// An ephemeris in days is the same orbit with the same density, apart from units.
 #[test]
 fn an_ephemeris_gives_the_posterior_of_what_it_stands_for() {
     use Parameter::{Conjunction, K, Period, Phi, PorbOverProt};
@@ -123,7 +123,7 @@ fn an_ephemeris_gives_the_posterior_of_what_it_stands_for() {
         let (x, y) = (named.to_sampling(&b), internal.to_sampling(&a));
         assert!((x[0] - y[0]).abs() < 1e-14 && (x[2] - y[2]).abs() < 1e-14);
     }
-    // a conjunction that may be anywhere in one orbit is a phase that may be anything
+    // a conjunction anywhere in one orbit is a uniform phase
     let phase = of(vec![k, (Phi, Prior::Periodic)]);
     let conjunction = of(vec![k, (Conjunction, Prior::Uniform { min: 150.0, max: 155.1 })]);
     let density = |space: &ParameterSpace, theta: &[f64]| space.log_prior(theta);

@@ -18,7 +18,7 @@ fn examples() -> Vec<Prior> {
     ]
 }
 
-/// A finite interval that holds all but 1e-20 of the density.
+/// A finite interval that contains all but 1e-20 of the density.
 fn interval(prior: &Prior) -> (f64, f64) {
     match *prior {
         Prior::Normal { mean, sd, min, max } => {
@@ -45,7 +45,7 @@ fn cumulative(prior: &Prior, n: usize) -> (f64, f64, Vec<f64>) {
 fn densities_integrate_to_one() {
     for prior in examples() {
         let total = *cumulative(&prior, 20_000).2.last().unwrap();
-        // The midpoint rule on 1/x over these cells is good to 3e-6.
+        // The midpoint rule on 1/x over these cells is accurate to 3e-6.
         assert!((total - 1.0).abs() < 1e-5, "{prior:?}: {total}");
     }
 }

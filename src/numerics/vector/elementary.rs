@@ -1,5 +1,5 @@
 //! Exponential, logarithm, sine and cosine for loops that are compiled into vector instructions: without branches, to
-//! two units in the last place where nothing else is said; and rounding.
+//! two units in the last place unless noted; and rounding.
 //!
 //! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for sine, cosine and the logarithm in single
 //! precision, and the series to r^13 over |r| < ln(2)/2 for the exponential.
@@ -12,7 +12,7 @@ const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// The same for single precision.
 const SINGLE_LN_2: [f32; 2] = [6.931_381e-1, 9.058_001e-6];
 
-/// 2^52: from here on neighbouring numbers are integers, which stand in their last bits.
+/// 2^52: from here on neighbouring numbers are integers, which are in their last bits.
 pub const INTEGERS: f64 = 4_503_599_627_370_496.0;
 
 /// 2^23: the same in single precision.
@@ -24,7 +24,7 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 /// The same in single precision, for numbers below 2^22.
 const SINGLE_ROUND: f32 = 12_582_912.0;
 
-/// Beyond it e^-x is no normal number.
+/// Beyond it e^-x is not a normal number.
 const LARGEST_EXPONENT: f64 = 708.0;
 
 /// pi / 2 in three parts: the first two are exact times any integer below 2^20.
@@ -103,11 +103,11 @@ pub fn exp_minus(i: impl Instructions, x: f64) -> f64 {
     let exponent = rounded - ROUND;
     let r = i.multiply_add(-exponent, LN_2[1], i.multiply_add(-exponent, LN_2[0], -x));
     let more = i.multiply_add(r * r, polynomial(i, &EXPONENTIAL, r), r);
-    // the exponent stands in the last bits of the rounded sum
+    // the exponent is in the last bits of the rounded sum
     (1.0 + more) * f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
 }
 
-/// `ln(1 + x)` and `1 / (1 + x)` for x from 0 to 1, to four units in the last place, by one division.
+/// `ln(1 + x)` and `1 / (1 + x)` for x from 0 to 1, to four units in the last place, with one division.
 #[inline(always)]
 pub fn ln_1p_and_inverse(i: impl Instructions, x: f64) -> (f64, f64) {
     let (y, z) = (1.0 + x, 2.0 + x);
@@ -140,7 +140,7 @@ pub fn ln_1p_single(i: impl Instructions, x: f32) -> f32 {
     exponent * SINGLE_LN_2[0] - ((half - rest) - f)
 }
 
-/// Sine and cosine of x (rad); beyond some 10^6, as precise as x is, and beyond 10^15 without a meaning.
+/// Sine and cosine of x (rad); beyond some 10^6, as precise as x, and beyond 10^15 meaningless.
 #[inline(always)]
 pub fn sin_cos(i: impl Instructions, x: f64) -> (f64, f64) {
     let rounded = i.multiply_add(x, std::f64::consts::FRAC_2_PI, ROUND);
@@ -149,7 +149,7 @@ pub fn sin_cos(i: impl Instructions, x: f64) -> (f64, f64) {
     let square = r * r;
     let sine = i.multiply_add(r * square, polynomial(i, &SINE, square), r);
     let cosine = i.multiply_add(square * square, polynomial(i, &COSINE, square), i.multiply_add(-0.5, square, 1.0));
-    // the quarter turns stand in the last bits of the rounded sum
+    // the quarter turns are in the last bits of the rounded sum
     let quarter = rounded.to_bits();
     let (s, c) = if quarter & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
     let sign = |negative: u64| negative << 63;

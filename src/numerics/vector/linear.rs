@@ -1,8 +1,8 @@
-//! Sums and combinations of rows of numbers, as long as a map.
+//! Sums and combinations of rows of numbers of the length of a map.
 
 use super::{Instructions, Number, Task};
 
-/// Numbers that are summed side by side, whatever the instructions.
+/// Number of parallel sums, whatever the instructions.
 const PARTS: usize = 32;
 
 /// The same for rows of some hundred numbers.

@@ -2,10 +2,10 @@
 //! run time.
 //!
 //! A hot loop is a [`Task`]: written once, inlined into an entry compiled for each set of instructions. The compiler
-//! makes vectors of most loops by itself; where it does not, they are written in registers. Products are fused with
-//! sums in two of the sets, so that results differ in the last digits between processors with and without AVX2, never
-//! between runs on one; how wide the registers are does not change the order of a sum. Closures that take instructions
-//! are to be kept out of hot loops: where one is not inlined, it is compiled for every processor.
+//! vectorises most loops by itself; others are written with registers. Products are fused with sums in two of the sets,
+//! so that results differ in the last digits between processors with and without AVX2, never between runs on one; the
+//! width of the registers does not change the order of a sum. Closures that take instructions must not be used in hot
+//! loops: where one is not inlined, it is compiled for every processor.
 
 pub mod elementary;
 pub mod linear;
@@ -22,8 +22,7 @@ pub trait Task {
     fn run<I: Instructions>(self, instructions: I) -> Self::Output;
 }
 
-/// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this
-/// module.
+/// A set of instructions; a value of it proves that the processor has them. Only this module creates them.
 pub trait Instructions: Copy + sealed::Sealed {
     /// Its registers for numbers in double precision.
     type Doubles: Scattered<Number = f64>;
@@ -70,7 +69,7 @@ pub struct Avx2(());
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512(Avx2);
 
-/// What unsafe code relies on, out of reach for anybody else.
+/// Guarantees for unsafe code, private to this module.
 mod sealed {
     pub trait Sealed {}
     impl Sealed for super::Portable {}
@@ -88,7 +87,7 @@ mod sealed {
 pub fn run<T: Task>(task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        // safe: they are there
+        // safe: the processor has them
         #[allow(unsafe_code)]
         if has_avx512() {
             return unsafe { run_avx512(task) };
@@ -99,8 +98,7 @@ pub fn run<T: Task>(task: T) -> T::Output {
     task.run(Portable)
 }
 
-/// Asks memory for the entry `distance` entries on, which need not be there: what is read in a row from far away comes
-/// sooner.
+/// Prefetches the entry `distance` entries ahead, which need not exist: it speeds up reading long rows.
 #[inline(always)]
 pub fn fetch_ahead<T>(entry: &T, distance: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -119,18 +117,18 @@ pub fn fetch_ahead<T>(entry: &T, distance: usize) {
     let _ = (entry, distance);
 }
 
-/// Bytes that memory hands out at a time.
+/// Bytes per cache line.
 #[cfg(target_arch = "x86_64")]
 const CACHE_LINE: usize = 64;
 
-/// What each set of instructions that this processor has makes of a task, the portable one first.
+/// The result of a task with each set of instructions of this processor, the portable one first.
 #[cfg(test)]
 pub fn by_each<T: Task>(mut task: impl FnMut() -> T) -> Vec<T::Output> {
     #[cfg_attr(not(target_arch = "x86_64"), allow(unused_mut))]
     let mut outputs = vec![task().run(Portable)];
     #[cfg(target_arch = "x86_64")]
     {
-        // safe: they are there
+        // safe: the processor has them
         #[allow(unsafe_code)]
         if has_avx2() {
             outputs.push(unsafe { run_avx2(task()) });

@@ -1,6 +1,6 @@
-//! Numbers side by side, in the registers of each set of instructions, in double or single precision.
+//! Vectors of numbers in the registers of each set of instructions, in double or single precision.
 //!
-//! Here are those that every processor has.
+//! Those of every processor are here.
 
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -28,12 +28,12 @@ pub trait Number:
     fn multiply_add(instructions: impl Instructions, a: Self, b: Self, c: Self) -> Self;
 }
 
-/// Arithmetic on numbers side by side; having it at hand proves that the processor has the instructions.
+/// Arithmetic on vectors of numbers; a value of it proves that the processor has the instructions.
 pub trait Registers: Copy + Sealed {
-    /// What stands in a lane.
+    /// The type of a lane.
     type Number: Number;
 
-    /// Numbers side by side, in a register.
+    /// A vector of numbers in a register.
     type Lanes: Copy;
 
     /// How many of them.
@@ -45,7 +45,7 @@ pub trait Registers: Copy + Sealed {
     /// The numbers from entry `first` on.
     fn load(self, from: &[f32], first: usize) -> Self::Lanes;
 
-    /// Puts numbers there.
+    /// Stores numbers there.
     fn store(self, x: Self::Lanes, to: &mut [Self::Number], first: usize);
 
     /// `a + b`.
@@ -66,15 +66,15 @@ pub trait Scattered: Registers {
     /// The sum over the lanes.
     fn total(self, x: Self::Lanes) -> f64;
 
-    /// The numbers at the places that are listed from entry `first` on.
+    /// The numbers at the places listed from entry `first` on.
     ///
     /// # Safety
     /// The places lie within `from`.
     #[allow(unsafe_code)]
     unsafe fn pick(self, from: &[Self::Number], places: &[u32], first: usize) -> Self::Lanes;
 
-    /// Puts numbers where [`Scattered::pick`] takes them from, the first lane last: where two have one place, the first
-    /// is it.
+    /// Stores numbers where [`Scattered::pick`] reads them, the first lane last: where two lanes share a place, the
+    /// first wins.
     ///
     /// # Safety
     /// The places lie within `to`.

@@ -1,4 +1,4 @@
-//! Marginal likelihoods against sums over all parameters, and how often chance makes a Bayes factor.
+//! Marginal likelihoods against sums over all parameters, and how often noise produces a large Bayes factor.
 
 use super::*;
 use crate::planets::periodogram::sample::{self, correlated, normal, orbit, uneven};
@@ -21,7 +21,7 @@ fn with_priors<T>(periods: [[f64; 2]; 2], largest_e: f64, run: impl FnOnce([&Pla
     run([&prior(0), &prior(1)])
 }
 
-/// Shares of a normal distribution are what panels sum to, wherever the bounds are.
+/// Closed forms by the normal distribution agree with panels, wherever the bounds are.
 #[test]
 fn a_uniform_prior_of_k_has_a_closed_form() {
     with_priors([[1.0, 2.0]; 2], 0.0, |[prior, _]| {
@@ -46,7 +46,7 @@ fn star(k: f64, period: f64, seed: u64) -> VelocityQuadratic {
     correlated(&cycles, &rv, seed)
 }
 
-/// A sum over K, phase and period alike, velocities made anew for every one.
+/// A plain sum over K, phase and period, velocities computed for each.
 #[test]
 fn a_circle_is_the_sum_over_all_its_parameters() {
     for (k, seed) in [(0.0, 1), (0.1, 2)] {
@@ -65,7 +65,7 @@ fn a_circle_is_the_sum_over_all_its_parameters() {
     }
 }
 
-/// The same of an ellipse, uniform in eccentricity, periastron and phase.
+/// The same for a Keplerian orbit, uniform in eccentricity, periastron and phase.
 #[test]
 fn an_ellipse_is_the_sum_over_all_its_parameters() {
     let quadratic = star(0.05, 1.7, 3);
@@ -97,7 +97,7 @@ fn an_ellipse_is_the_sum_over_all_its_parameters() {
     );
 }
 
-/// The same of two circles.
+/// The same for two circular orbits.
 #[test]
 fn two_circles_are_the_sum_over_all_their_parameters() {
     let cycles = uneven(14, 6.0);
@@ -136,13 +136,13 @@ fn a_planet_is_included_where_it_is() {
     assert!(found.circle.ln_bayes > 5.0, "{found:?}");
     assert!((found.inclusion[0].porb_over_prot - 1.7).abs() < 0.1, "{found:?}");
     assert!(found.inclusion[0].false_inclusion_probability < 0.01, "{found:?}");
-    // a second planet and an ellipse are not asked for
+    // neither a second planet nor an eccentricity is requested
     assert!(found.two_circles.ln_bayes < found.circle.ln_bayes + 2.0, "{found:?}");
     assert!(found.ellipse.ln_bayes < found.circle.ln_bayes + 2.0, "{found:?}");
 }
 
-/// Gradients without a planet scatter with the information: of 200 such stars hardly any has a Bayes factor above 150.
-/// Tens of minutes of one core.
+/// Gradients without a planet have the information as covariance: hardly any of 200 such stars has a Bayes factor above
+/// 150. Takes tens of minutes on one core.
 #[test]
 #[ignore = "by hand: tens of minutes"]
 fn by_hand_chance_hardly_makes_a_bayes_factor_of_150() {
@@ -162,9 +162,9 @@ fn by_hand_chance_hardly_makes_a_bayes_factor_of_150() {
     assert!(above(largest) <= 2);
 }
 
-/// What looks like a jitter without a planet is none beside it: velocities with errors of 0.03 km/s of a planet of 0.3
-/// km/s. With the jitter held as it is found without a planet, ln of the Bayes factor is some 10; beside the orbit no
-/// jitter is needed.
+/// An apparent jitter without a planet vanishes with the orbit in the model: a planet of 0.3 km/s in velocities with
+/// uncertainties of 0.03 km/s. With the jitter fixed at the value found without a planet, ln of the Bayes factor is
+/// some 10; with the orbit in the model no jitter is needed.
 #[test]
 fn a_planet_does_not_hide_behind_the_jitter_that_it_makes() {
     let cycles = uneven(16, 4.0);

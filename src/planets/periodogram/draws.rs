@@ -1,7 +1,7 @@
-//! What a periodogram looks like without a planet: the highest peak of many draws of the gradient.
+//! Periodograms without a planet: the highest peak of many draws of the gradient.
 //!
-//! Without a planet the gradient has mean 0 and the information as covariance: noise, and spots that the map leaves
-//! over. `Delta ln L(P) = |L^-1 X' gradient|^2 / 2` with `A = L L'` at every trial period. The whitened rows of all
+//! Without a planet the gradient has mean 0 and the information as covariance: noise and residual (unresolved-spot)
+//! noise. `Delta ln L(P) = |L^-1 X' gradient|^2 / 2` with `A = L L'` at every trial period. The whitened rows of all
 //! periods are one matrix, times a square root of the information, times the deviates. Each block of draws has its own
 //! stream of random numbers, so that the number of threads does not matter.
 
@@ -13,20 +13,20 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
-/// Draws that share one matrix product, and one stream of random numbers.
+/// Draws per matrix product and per stream of random numbers.
 const DRAWS: usize = 250;
 
-/// Rows, two a trial period, whose product with the draws is held at once.
+/// Rows, two per trial period, whose product with the draws is held in memory at once.
 const ROWS: usize = 1024;
 
-/// The highest Delta ln L over the trial frequencies of each of `draws` gradients, the jitter being what suits best
-/// without an orbit and with each.
+/// The highest Delta ln L over the trial frequencies of each of `draws` gradients, with the best jitter without an
+/// orbit and with each.
 pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Vec<f64> {
     heights(jitters, &|level| whitened(level, frequencies), highest, draws, seed)
 }
 
-/// Delta ln L of the amplitude of the velocities `unit` of each of `draws` gradients, 0 of one below 0; the jitter as
-/// for [`maxima`].
+/// Delta ln L of the amplitude of the velocities `unit` for each of `draws` gradients, 0 for a negative amplitude; the
+/// jitter as for [`maxima`].
 pub fn amplitudes(jitters: &Jitters, unit: &DVector<f64>, draws: usize, seed: u64) -> Vec<f64> {
     let row = |level: &Level| {
         let information = unit.dot(&(&level.quadratic.information * unit));
@@ -36,7 +36,7 @@ pub fn amplitudes(jitters: &Jitters, unit: &DVector<f64>, draws: usize, seed: u6
     heights(jitters, &row, above_zero, draws, seed)
 }
 
-/// Delta ln L of each of `draws` gradients: without a jitter what `of` makes of the rows of its level and of deviates.
+/// Delta ln L of each of `draws` gradients: without a jitter, `of` applied to the rows of its level and the deviates.
 fn heights(
     jitters: &Jitters,
     rows: &dyn Fn(&Level) -> DMatrix<f64>,

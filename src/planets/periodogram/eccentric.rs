@@ -1,9 +1,9 @@
 //! The best Keplerian orbit around a peak.
 //!
 //! Given period, eccentricity and time of periastron, the velocities are linear in `K cos(omega)` and `K sin(omega)`;
-//! the best of a grid of the other two at the peak's period starts a climb in all five. There the coordinates are those
-//! of the circle, (a, b, frequency), which give the mean longitude, and `(e cos omega, e sin omega)`: at e = 0 nothing
-//! is singular.
+//! the best of a grid in the other two at the peak's period is the start of an optimisation in all five. Its
+//! coordinates are those of the circular orbit, (a, b, frequency), which give the mean longitude, and `(e cos omega, e
+//! sin omega)`, which are regular at e = 0.
 
 use super::frequencies::Frequencies;
 use super::orbits::{SIGMA_OF_UNKNOWN_PHASE, mid_cycle};
@@ -23,7 +23,7 @@ const ECCENTRICITIES: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// Times of periastron of the grid.
 const PERIASTRA: usize = 48;
 
-/// Step in `e cos omega` and `e sin omega` by which times are differentiated.
+/// Step in `e cos omega` and `e sin omega` for numerical derivatives.
 const STEP: f64 = 1e-5;
 
 /// A Keplerian orbit with its standard errors, NaN where ln L does not bound them.
@@ -31,39 +31,39 @@ const STEP: f64 = 1e-5;
 pub struct KeplerianOrbit {
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
-    /// Its error.
+    /// Its standard error.
     pub sigma_k_kms: f64,
     /// Period over rotation period.
     pub porb_over_prot: f64,
-    /// Its error.
+    /// Its standard error.
     pub sigma_porb_over_prot: f64,
     /// Eccentricity.
     pub eccentricity: f64,
-    /// Its error.
+    /// Its standard error.
     pub sigma_eccentricity: f64,
     /// Argument of periastron (radians), in [0, 2 pi).
     pub omega: f64,
-    /// Its error, at most that of an angle of which nothing is known.
+    /// Its standard error, at most that of a uniform angle.
     pub sigma_omega: f64,
     /// Rotation cycle of the periastron nearest to mid-time.
     pub periastron_cycle: f64,
-    /// Its error, at most that of a phase of which nothing is known.
+    /// Its standard error, at most that of a uniform phase.
     pub sigma_periastron_cycle: f64,
-    /// `K sqrt(1 - e^2)`, which the mass of the planet goes by (km/s).
+    /// `K sqrt(1 - e^2)`(km/s), to which the mass of the planet is proportional.
     pub mass_amplitude_kms: f64,
-    /// Its error.
+    /// Its standard error.
     pub sigma_mass_amplitude_kms: f64,
     /// Rotation cycle of the largest radial velocity nearest to mid-time.
     pub maximum_cycle: f64,
-    /// Its error, at most that of a phase of which nothing is known.
+    /// Its standard error, at most that of a uniform phase.
     pub sigma_maximum_cycle: f64,
     /// Rotation cycle of the inferior conjunction nearest to mid-time.
     pub conjunction_cycle: f64,
-    /// Its error, at most that of a phase of which nothing is known.
+    /// Its standard error, at most that of a uniform phase.
     pub sigma_conjunction_cycle: f64,
-    /// ln L above no planet.
+    /// ln L relative to no planet.
     pub delta_ln_l: f64,
-    /// ln L above the circular orbit of the peak, with two parameters fewer.
+    /// ln L relative to the circular orbit of the peak, which has two parameters fewer.
     pub gain_over_circle: f64,
 }
 
@@ -109,7 +109,7 @@ fn best_of_grid(quadratic: &VelocityQuadratic, frequency: f64) -> Option<DVector
     best.map(|(_, theta)| theta)
 }
 
-/// The best Keplerian orbit around `peak`; `None` where there is no planet at all.
+/// The best Keplerian orbit around `peak`; `None` where K is 0.
 pub fn keplerian(quadratic: &VelocityQuadratic, frequencies: &Frequencies, peak: &Peak) -> Option<KeplerianOrbit> {
     let (lo, hi) = frequencies.range();
     let orbit = |theta: &DVector<f64>| {
@@ -126,7 +126,7 @@ pub fn keplerian(quadratic: &VelocityQuadratic, frequencies: &Frequencies, peak:
     Some(named(&quadratic.cycles, &maximum, peak.orbit.delta_ln_l))
 }
 
-/// The orbit at a maximum, its errors to first order in the coordinates.
+/// The orbit at a maximum, its standard errors to first order in the coordinates.
 fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
     let Maximum { theta, delta_ln_l, covariance } = maximum;
     let (a, b, f, h, k) = (theta[0], theta[1], theta[2], theta[3], theta[4]);
@@ -134,7 +134,7 @@ fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
         let slope = DVector::from_row_slice(&slope);
         covariance.as_ref().map_or(f64::NAN, |c| slope.dot(&(c * &slope)).sqrt())
     };
-    // what is not a number here comes of an angle without direction
+    // NaN arises here where an angle has no direction
     let capped = |sigma: f64, most: f64| if covariance.is_some() { sigma.min(most) } else { sigma };
     let (k2, e2) = (a * a + b * b, h * h + k * k);
     let (amplitude, e, omega) = (k2.sqrt(), e2.sqrt(), k.atan2(h));
@@ -150,7 +150,7 @@ fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
     let passage = |from_node: f64| {
         let angle = (b.atan2(a) + longitude(h, k, from_node) + PI).rem_euclid(TAU) - PI;
         let by = |dh: f64, dk: f64| longitude(h + dh, k + dk, from_node) - longitude(h - dh, k - dk, from_node);
-        // a branch of the angle may lie between the two
+        // the angle may cross a branch cut between the two
         let slope = |dh: f64, dk: f64| ((by(dh, dk) + PI).rem_euclid(TAU) - PI) / (2.0 * STEP);
         let (by_h, by_k) = (turn * slope(STEP, 0.0), turn * slope(0.0, STEP));
         let error = sigma([-turn * b / k2, turn * a / k2, -turn * angle / f, by_h, by_k]);

@@ -1,18 +1,18 @@
-//! How often stars without a planet show a peak as high: by draws, and beyond their reach by extreme-value theory.
+//! False-alarm probability: by simulated stars without a planet, and beyond their reach by extreme-value theory.
 //!
 //! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 -
 //! exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the
-//! upper tail of the draws by maximum likelihood, those below the tail counting as such. Where a jitter of unknown size
-//! stands beside the orbit high peaks are more frequent, as in the F-test: z is taken times a rate, which is found
-//! along with W.
+//! upper tail of the draws by maximum likelihood, draws below the tail entering as censored. Where a jitter of unknown
+//! size is fitted with the orbit, high peaks are more frequent, as in the F-test: z is multiplied by a rate, which is
+//! fitted along with W.
 
 use super::draws::maxima;
 use super::jitter::Jitters;
 
-/// The tail to which W is fitted: this part of the draws.
+/// The tail to which W is fitted: this fraction of the draws.
 const TAIL: f64 = 0.1;
 
-/// Fewer draws than this above a peak, and the extreme-value form is used.
+/// With fewer draws than this above a peak, the extreme-value form is used.
 const ENOUGH: usize = 30;
 
 /// The distribution of the highest Delta ln L without a planet.
@@ -22,27 +22,27 @@ pub struct FalseAlarm {
     pub maxima: Vec<f64>,
     /// The form of the tail.
     pub tail: Tail,
-    /// RV offset of a night of these stars: its standard deviation (km/s).
+    /// Standard deviation of the nightly RV offsets of these stars (km/s).
     pub night_kms: f64,
 }
 
 /// `1 - exp(-tau)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tail {
-    /// Number of independent peaks that the search looks at, but for a factor of order 1.
+    /// Number of independent frequencies of the search, up to a factor of order 1.
     pub w: f64,
-    /// The rate: 1 where the noise is known.
+    /// The rate: 1 for known noise.
     pub rate: f64,
 }
 
-/// A false-alarm probability, by both ways.
+/// A false-alarm probability by both methods.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probability {
     /// `(1 + draws as high) / (1 + draws)`.
     pub by_draws: f64,
     /// By the extreme-value form.
     pub by_tail: f64,
-    /// Whether enough draws are as high for these to be taken.
+    /// Whether enough draws are as high to use the first.
     pub draws_suffice: bool,
 }
 
@@ -56,14 +56,14 @@ impl Tail {
         Tail { w, rate }
     }
 
-    /// The same with the rate that the draws are most likely with.
+    /// The same with the maximum-likelihood rate.
     fn fit_with_rate(maxima: &[f64]) -> Self {
         const RATES: usize = 90;
         let all = (0..=RATES).map(|k| Tail::fit(maxima, 0.1 + 0.01 * k as f64));
         all.max_by(|a, b| a.log_likelihood(maxima).total_cmp(&b.log_likelihood(maxima))).expect("rates")
     }
 
-    /// ln of the density of the draws in the tail, those below it counting as such: sum of `ln(-d tau / dz) - tau`.
+    /// ln of the density of the draws in the tail, those below it censored: sum of `ln(-d tau / dz) - tau`.
     fn log_likelihood(&self, maxima: &[f64]) -> f64 {
         let below = maxima.len() - (TAIL * maxima.len() as f64).ceil() as usize;
         let of = |z: &f64| {
@@ -74,7 +74,7 @@ impl Tail {
         maxima[below..].iter().map(of).sum::<f64>() - below as f64 * self.peaks(maxima[below])
     }
 
-    /// tau: mean number of peaks above `delta_ln_l`; it falls from 1/2 on.
+    /// tau: mean number of peaks above `delta_ln_l`; it falls beyond 1/2.
     fn peaks(&self, delta_ln_l: f64) -> f64 {
         let z = (self.rate * delta_ln_l).max(0.5);
         self.w * z.sqrt() * (-z).exp()
@@ -108,7 +108,7 @@ impl Probability {
 }
 
 impl FalseAlarm {
-    /// From `draws` gradients without a planet, for a search at these frequencies.
+    /// The distribution from `draws` gradients without a planet, for a search at these frequencies.
     pub fn draw(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Self {
         let mut maxima = maxima(jitters, frequencies, draws, seed);
         maxima.sort_by(f64::total_cmp);
@@ -157,8 +157,7 @@ mod tests {
         (quadratic, frequencies.per_cycle)
     }
 
-    /// Kolmogorov-Smirnov: gradients of the null model itself, drawn another way, have uniform false-alarm
-    /// probabilities.
+    /// Kolmogorov-Smirnov: independently drawn gradients of the null model have uniform false-alarm probabilities.
     #[test]
     fn the_probability_is_uniform_under_its_own_null() {
         let (quadratic, frequencies) = star();
@@ -188,7 +187,7 @@ mod tests {
         for p in [0.05, 0.01, 1e-3] {
             let z = many.level(p);
             let found = few.tail.probability(z);
-            // the form is an upper bound in theory; W of a thousand draws in the tail is good to 3 %
+            // the form is an upper bound in theory; W of a thousand draws in the tail is accurate to 3 %
             assert!((found / p).ln().abs() < 0.3, "{found} for {p} at {z}");
             assert!((few.probability(few.level(p)).value() / p).ln().abs() < 0.1);
         }

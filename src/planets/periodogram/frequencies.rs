@@ -1,38 +1,39 @@
-//! The trial periods of a blind search: uniform in frequency, several to a peak.
+//! The trial periods of a blind search: uniform in frequency, several per peak.
 //!
-//! A peak is about `1/T` wide, T the time base; ten frequencies to each of these lose less than 1 % of its height. The
-//! longest period is 2 T, of which the data show half an orbit. Unevenly spaced data have no Nyquist frequency, but one
-//! searches no further than some multiple of its average `N / (2 T)`: 5 of them, the custom of Lomb-Scargle codes
-//! (VanderPlas 2018, ApJS 236, 16, section 7.1). Of a gap between seasons 60 d count in that T. Where profiles stand at
-//! about even distances the periods shorter than twice the median spacing are mere reflections: the search ends there.
+//! A peak is about `1/T` wide, T the time base; ten frequencies per peak lose less than 1 % of its height. The longest
+//! period is 2 T, of which the data show half an orbit. Unevenly spaced data have no Nyquist frequency, but searches
+//! usually end at a multiple of the average Nyquist frequency `N / (2 T)`: here 5, the custom of Lomb-Scargle codes
+//! (VanderPlas 2018, ApJS 236, 16, section 7.1). A gap between seasons counts as at most 60 d in that T. Where profiles
+//! are about evenly spaced, the periods shorter than twice the median spacing are mere reflections: the search ends
+//! there.
 
 use crate::numerics::quantile::middle;
 use serde::{Deserialize, Serialize};
 
-/// The shortest period is that of this many average Nyquist frequencies.
+/// The highest frequency, in average Nyquist frequencies.
 const NYQUIST_FACTOR: f64 = 5.0;
 
-/// A gap between seasons counts for at most so much (d) of the time in which profiles stand: two short seasons far
-/// apart tell of short periods what each of them tells.
+/// A gap between seasons counts as at most this long (d) in that average: two short seasons far apart constrain short
+/// periods no better than each of them.
 const LONGEST_GAP_D: f64 = 60.0;
 
-/// Trial frequencies to each `1/T`.
+/// Trial frequencies per `1/T`.
 const OVERSAMPLING: f64 = 10.0;
 
-/// The longest period is that many time bases.
+/// The longest period, in time bases.
 const LONGEST_PERIOD: f64 = 2.0;
 
-/// No search needs more.
+/// Upper bound on the number of frequencies.
 const MOST_FREQUENCIES: f64 = 1e6;
 
-/// What to search; what is `None` follows from the sampling.
+/// The range to search; `None` follows from the sampling.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrequencySettings {
     /// Shortest period (d).
     pub min_period_d: Option<f64>,
     /// Longest period (d).
     pub max_period_d: Option<f64>,
-    /// Frequencies to each inverse time base.
+    /// Frequencies per inverse time base.
     pub oversampling: Option<f64>,
 }
 
@@ -43,11 +44,11 @@ pub struct Frequencies {
     pub per_cycle: Vec<f64>,
     /// Time base in rotation cycles.
     pub time_base_cycles: f64,
-    /// The rotation period (d) that a cycle is.
+    /// The rotation period (d).
     pub rotation_period_d: f64,
 }
 
-/// Periods that make no sense, or sampling that shows none.
+/// Invalid periods, or a sampling that constrains none.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FrequencyError {
     /// Fewer than three different times.
@@ -61,7 +62,7 @@ pub enum FrequencyError {
         /// Its value.
         value: f64,
     },
-    /// Shortest and longest change places.
+    /// The shortest is not below the longest.
     #[error("{name}: the shortest period ({min_d} d) must be below the longest ({max_d} d)")]
     Order {
         /// The option at fault.
@@ -71,7 +72,7 @@ pub enum FrequencyError {
         /// Longest period (d).
         max_d: f64,
     },
-    /// More frequencies than any search needs.
+    /// Too many frequencies.
     #[error("{name}: {count:.2e} trial periods, more than a million; search fewer")]
     TooMany {
         /// The option at fault.
@@ -130,7 +131,7 @@ impl Frequencies {
     }
 }
 
-/// How the profiles are spread in time.
+/// The sampling in time.
 struct Sampling {
     time_base: f64,
     without_gaps: f64,
@@ -181,7 +182,7 @@ mod tests {
         assert!((hi - 5.0 * 60.0 / (2.0 * 5.09)).abs() < 1e-9, "{hi}");
     }
 
-    /// Half a year between two seasons is 60 d, and the time base is what it is.
+    /// Half a year between two seasons is 60 d, and the time base is unchanged.
     #[test]
     fn seasons_far_apart_are_searched_as_far_as_near_ones() {
         let seasons = |apart: f64| [even(20, 0.5), even(20, 0.5).iter().map(|x| x + apart).collect()].concat();

@@ -1,12 +1,12 @@
-//! Orbits put into the velocities of a star, and the highest peak of each, beside a jitter and offsets of nights of
+//! Orbits injected into the velocities of a star, and the highest peak of each, with a jitter and nightly offsets of
 //! unknown size and spots of an unknown field.
 //!
 //! An orbit adds `I V` to the gradient and changes nothing else, so that the whitened gradient at every trial period
-//! and for every size of the jitter is linear in the orbit's two amplitudes: three products a period, and each orbit
-//! of that period is a sum. A jitter that hides an orbit grows with it, so sizes reach from none to that of the largest
-//! orbit, those of offsets to the most that count. Spots that hide an orbit are of another field, shorter-lived: a
-//! search takes the field that suits the star best with the orbit in its velocities and no planet in the model, which
-//! lies between the fields that are given.
+//! and for every size of the jitter is linear in the orbit's two amplitudes: three products per period, and each orbit
+//! of that period is a sum. A jitter that absorbs an orbit grows with it, so its values reach from 0 to the largest
+//! orbit, those of offsets to the largest allowed. Spots that absorb an orbit belong to another field with a shorter
+//! lifetime: a search uses the field that maximises ln L with the orbit in the velocities and no planet in the model,
+//! which lies between the given fields.
 
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
@@ -20,40 +20,40 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Sizes of the jitter grow by this factor.
+/// Ratio of successive jitters.
 const STEP: f64 = std::f64::consts::SQRT_2;
 
-/// Those of offsets of nights by this one.
+/// Ratio of successive nightly offsets.
 const STEP_OF_OFFSETS: f64 = 2.0;
 
-/// The smallest one, of the standard error of a velocity.
+/// The smallest jitter, in standard errors of a velocity.
 const SMALLEST: f64 = 0.35;
 
-/// Draws by which the level of detections beside a fitted jitter is found, one for each size of it; beyond their reach
-/// by the form of the tail.
+/// Draws for the detection threshold with a fitted jitter, one threshold per jitter; beyond their reach the form of the
+/// tail is used.
 const DRAWS: usize = 1000;
 
 /// A star without a planet, with one field of spots.
 #[derive(Clone, Debug)]
 pub struct OfField {
-    /// The velocities that are searched; without a jitter where that is fitted.
+    /// The velocities that are searched; without a jitter where the jitter is fitted.
     pub velocities: VelocityQuadratic,
-    /// Those by which the field is fitted: with all constant velocities held.
+    /// The velocities for the fit of the field: all constant velocities fixed.
     pub held: VelocityQuadratic,
-    /// What its fit maximises: ln L at velocities 0, the prior of the field counted.
+    /// The objective of that fit: ln L at velocities 0, including the prior of the field.
     pub ln_posterior: f64,
 }
 
 /// What is known of the jitter.
 #[derive(Clone, Debug)]
 pub enum Jitter {
-    /// All: it is among the noise.
+    /// Its size: it is part of the noise.
     Known,
-    /// It is fitted, its prior of that scale (km/s), as are offsets of these nights.
+    /// It is fitted under a prior of that scale (km/s), as are offsets of these nights.
     Fitted(Option<f64>, Option<Nights>),
 }
 
-/// A star without a planet, into which orbits are put.
+/// A star without a planet, into which orbits are injected.
 pub struct Injections<'a> {
     fields: Vec<Field<'a>>,
     frequencies: &'a Frequencies,
@@ -63,7 +63,7 @@ pub struct Injections<'a> {
     trials: DMatrix<f64>,
 }
 
-/// One field, with jitters and offsets of all sizes.
+/// One field, with all jitters and offsets.
 struct Field<'a> {
     star: &'a OfField,
     scale_kms: Option<f64>,
@@ -71,18 +71,18 @@ struct Field<'a> {
     sizes: Vec<Size>,
 }
 
-/// A jitter and offsets of one size.
+/// One jitter and one size of offsets.
 struct Size {
     scatter: Scatter,
     /// From the gradient without a jitter to that beside it.
     left: DMatrix<f64>,
     /// From the gradient in (a, b) at every trial period to whitened amplitudes: lower factors of the information;
-    /// infinite where no orbit is bounded.
+    /// infinite where the orbit is unbounded.
     factors: Vec<[f64; 3]>,
     /// ln L at velocities 0: a constant, and directions of the gradient whose squares add to it.
     constant: f64,
     directions: DMatrix<f64>,
-    /// Delta ln L of a detection where this size suits the star without an orbit best.
+    /// Detection threshold in Delta ln L where this size is the best for the star without an orbit.
     level: OnceLock<f64>,
 }
 
@@ -94,12 +94,13 @@ pub struct Column<'a, 'b> {
     fields: Vec<OfPeriod>,
 }
 
-/// What orbits of one period change, with one field.
+/// Effect of orbits of one period, with one field.
 struct OfPeriod {
     /// ln L without a planet and without a jitter, in (a, b).
     gradient: Vector2<f64>,
     information: Matrix2<f64>,
-    /// Of each size: whitened amplitudes, and those along the directions, of no orbit and of a and b of 1 km/s.
+    /// For each size, the whitened amplitudes and those along the directions: without an orbit, and for a and b of 1
+    /// km/s.
     whitened: Vec<[DVector<f64>; 3]>,
     along: Vec<[DVector<f64>; 3]>,
 }
@@ -109,17 +110,17 @@ struct OfPeriod {
 pub struct Highest {
     /// Frequency (orbits a rotation cycle), refined between the trial periods.
     pub frequency: f64,
-    /// ln L above no planet, at a trial period.
+    /// ln L relative to no planet, at a trial period.
     pub delta_ln_l: f64,
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
-    /// Delta ln L of a detection.
+    /// Detection threshold in Delta ln L.
     pub level: f64,
 }
 
 impl<'a> Injections<'a> {
-    /// Into a star with one of these `fields`, in even steps along a line; orbits of up to `most_kms`. A detection has
-    /// that false-alarm `probability`.
+    /// Injections into a star with one of these `fields`, evenly spaced along a line; orbits of up to `most_kms`. A
+    /// detection has that false-alarm `probability`.
     pub fn new(
         fields: &'a [OfField],
         jitter: &Jitter,
@@ -150,7 +151,7 @@ impl<'a> Injections<'a> {
         *once::found(&size.level, || {
             let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
             let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
-            // without offsets a jitter stands in for them
+            // without offsets in the model a jitter absorbs them
             let jitter = (jitter_kms.hypot(night_kms), field.scale_kms);
             let of_offsets = || beside(velocities, &field.nights, size.scatter, jitter, Reach::Stable);
             let jitters = match (jitter_kms > 0.0, night_kms > 0.0) {
@@ -246,17 +247,17 @@ impl Size {
 /// Factors by which whitened amplitudes are 0.
 const UNBOUNDED: [f64; 3] = [f64::INFINITY, 0.0, f64::INFINITY];
 
-/// Numbers of the orbit (a, b) from those of no orbit and of a and b of 1 km/s.
+/// Amplitudes for the orbit (a, b) from those without an orbit and with a and b of 1 km/s.
 fn sum(parts: &[DVector<f64>; 3], ab: Vector2<f64>) -> DVector<f64> {
     &parts[0] + &parts[1] * ab.x + &parts[2] * ab.y
 }
 
-/// Number of the largest value.
+/// Index of the largest value.
 fn largest(values: &[f64]) -> Option<usize> {
     (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))
 }
 
-/// Number of the maximum uphill from one of the values.
+/// Index of the maximum reached by climbing from one of the values.
 fn uphill(values: &[f64], mut at: usize) -> usize {
     while at + 1 < values.len() && values[at + 1] > values[at] {
         at += 1;
@@ -273,7 +274,7 @@ impl Column<'_, '_> {
     pub fn highest(&self, k_kms: f64, phi: f64) -> Option<Highest> {
         let ab = amplitudes(self.cycles, self.frequency, k_kms, phi);
         let posteriors = self.ln_posteriors(ab);
-        // as a fit, which climbs from the field without the orbit: another maximum may be higher
+        // like a fit, which climbs from the field without the orbit and may miss a higher maximum
         let best = uphill(&posteriors, largest(&self.ln_posteriors(Vector2::zeros()))?);
         let here = self.highest_in(best, ab)?;
         if best == 0 || best + 1 == posteriors.len() {
@@ -284,17 +285,17 @@ impl Column<'_, '_> {
         Some(here.towards(next, beyond.abs()))
     }
 
-    /// What fits without a planet maximise, of each field, where (a, b) is in the velocities.
+    /// The objective of fits without a planet, for each field, with (a, b) in the velocities.
     fn ln_posteriors(&self, ab: Vector2<f64>) -> Vec<f64> {
         self.all.fields.iter().zip(&self.fields).map(|(field, of)| field.ln_posterior(of, ab)).collect()
     }
 
-    /// The highest peak with one of the fields, the orbit (a, b) being in the velocities.
+    /// The highest peak with one of the fields, with the orbit (a, b) in the velocities.
     fn highest_in(&self, field: usize, ab: Vector2<f64>) -> Option<Highest> {
         let (of, field) = (&self.fields[field], &self.all.fields[field]);
         let alone = field.alone(of, ab);
         let best_alone = largest(&alone)?;
-        // as a search: where without a planet no offsets suit best, none are tried
+        // like a search: where zero offsets are the best without a planet, none are tried
         let has_offsets = |size: usize| field.sizes[size].scatter.night_kms > 0.0;
         let is_tried = |size: &usize| has_offsets(best_alone) || !has_offsets(*size);
         let of_orbit = |size: usize| if is_tried(&size) { sum(&of.whitened[size], ab) } else { DVector::zeros(0) };
@@ -324,12 +325,12 @@ impl Column<'_, '_> {
 }
 
 impl Field<'_> {
-    /// ln L without a planet and beside each jitter, above that without one, where (a, b) is in the velocities.
+    /// ln L without a planet at each jitter relative to no jitter, with (a, b) in the velocities.
     fn alone(&self, of: &OfPeriod, ab: Vector2<f64>) -> Vec<f64> {
         self.sizes.iter().zip(&of.along).map(|(size, along)| size.constant + sum(along, ab).norm_squared()).collect()
     }
 
-    /// What a fit without a planet, and without offsets of nights, maximises, where (a, b) is in the velocities.
+    /// The objective of a fit without a planet and without nightly offsets, with (a, b) in the velocities.
     fn ln_posterior(&self, of: &OfPeriod, ab: Vector2<f64>) -> f64 {
         let alone = self.alone(of, ab).into_iter().zip(&self.sizes);
         let of_jitter = alone.filter(|(_, size)| size.scatter.night_kms == 0.0).map(|(ln_l, _)| ln_l);
@@ -339,7 +340,7 @@ impl Field<'_> {
 }
 
 impl Highest {
-    /// Part of the way to the peak of a neighbouring field: heights change by a factor from one to the next.
+    /// Interpolation towards the peak of a neighbouring field: heights change by a factor from one field to the next.
     fn towards(self, next: Highest, share: f64) -> Self {
         let between = |a: f64, b: f64| a + share * (b - a);
         Highest {
@@ -351,13 +352,13 @@ impl Highest {
     }
 }
 
-/// Where the parabola through three even steps, the middle one the highest, is highest: steps from the middle.
+/// Vertex of the parabola through three even steps, the middle one the highest: steps from the middle.
 fn vertex([before, here, after]: [f64; 3]) -> f64 {
     let bend = 2.0 * here - before - after;
     if bend > 0.0 { (0.5 * (after - before) / bend).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
-/// Where the parabola through the peak at a trial and its neighbours is highest.
+/// Vertex of the parabola through the peak at a trial and its neighbours.
 fn summit(frequencies: &[f64], trial: usize, height: impl Fn(usize) -> f64) -> f64 {
     if trial == 0 || trial + 1 == frequencies.len() {
         return frequencies[trial];

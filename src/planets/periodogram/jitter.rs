@@ -1,47 +1,47 @@
-//! A velocity jitter of unknown size beside the orbit: zero points of all profiles that scatter by s.
+//! An RV jitter of unknown size beside the orbit: independent RV offsets of all profiles with standard deviation s.
 //!
-//! With zero points integrated out `ln L(V)` of information I becomes that of information `(1 + s^2 I)^-1 I`. What is
-//! taken for jitter without a planet may be the planet: with few profiles a strong one hides behind its own noise. So s
-//! is what suits best, without an orbit and with each orbit, as in the F-test of a periodogram of unknown noise. Stars
-//! without a planet, whose zero points scatter as was found without one, are judged in the same way.
+//! Marginalised over the offsets, `ln L(V)` of information I becomes that of the information `(1 + s^2 I)^-1 I`. A
+//! jitter found without a planet in the model may be due to the planet: with few profiles a strong signal would be
+//! absorbed. So s is fitted both without an orbit and with each orbit, as in the F-test of a periodogram of unknown
+//! noise. Simulated stars without a planet have the jitter found without one, and are searched in the same way.
 
 use super::orbits::{CircularOrbit, Trial, scan};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 
-/// Sizes that are tried, of the one found without a planet.
+/// Trial jitters, in units of the one found without a planet.
 const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, std::f64::consts::SQRT_2];
 
-/// Directions of the gradient with less than this part of the largest variance do not move.
+/// Directions of the gradient with less than this fraction of the largest variance are dropped.
 const STILL: f64 = 1e-13;
 
-/// ln of the prior of a jitter (km/s) beside that of none: half-Cauchy of that scale (km/s), which lets a jitter be
-/// larger where the profiles ask for it (Gelman 2006, Bayesian Analysis 1, 515). Even without a scale.
+/// ln of the prior of a jitter (km/s) relative to that of none: half-Cauchy of that scale (km/s), whose tail admits a
+/// larger jitter where the profiles require it (Gelman 2006, Bayesian Analysis 1, 515). Uniform without a scale.
 pub fn ln_prior(jitter_kms: f64, scale_kms: Option<f64>) -> f64 {
     scale_kms.map_or(0.0, |scale| -(jitter_kms / scale).powi(2).ln_1p())
 }
 
-/// ln of the share of each size of a prior that is uniform up to the largest.
+/// ln of the weight of each size under a prior that is uniform up to the largest.
 pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
     let last = sizes.len() - 1;
     let share = |k: usize| 0.5 * (sizes[(k + 1).min(last)] - sizes[k.saturating_sub(1)]) / sizes[last];
     if last == 0 { vec![0.0] } else { (0..=last).map(|k| share(k).ln()).collect() }
 }
 
-/// Standard deviations (km/s) of jitter and offsets of nights.
+/// Standard deviations (km/s) of jitter and nightly offsets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scatter {
     pub jitter_kms: f64,
     pub night_kms: f64,
 }
 
-/// ln L of the velocities beside jitters of several sizes, and offsets of nights (`nights`).
+/// ln L of the velocities at several jitters and nightly offsets (`nights`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jitters {
     pub(super) levels: Vec<Level>,
-    /// ln of the share of each of a prior that is uniform up to the largest.
+    /// ln of the weight of each under a prior that is uniform up to the largest.
     pub(super) ln_shares: Vec<f64>,
-    /// What stars without a planet have, where offsets of nights are among it.
+    /// The noise of stars without a planet, where it includes nightly offsets.
     pub(super) null: Option<Scatter>,
 }
 
@@ -50,30 +50,30 @@ pub struct Jitters {
 pub struct Level {
     /// ln L of the velocities.
     pub quadratic: VelocityQuadratic,
-    /// ln L at velocities 0, the prior of the size counted, above that of the best size.
+    /// ln L at velocities 0, including the prior of the size, relative to the best size.
     pub ln_l: f64,
     /// Transposed: from deviates to the gradient of a star without a planet.
     pub(super) root: DMatrix<f64>,
     /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
     pub(super) constant: f64,
     pub(super) squares: DVector<f64>,
-    /// From deviates to these amplitudes; without rows where there is no jitter.
+    /// From deviates to these amplitudes; without rows in the absence of jitter.
     pub(super) rotation: DMatrix<f64>,
 }
 
-/// A trial period with the size of the jitter that suits its orbit best.
+/// A trial period with the best jitter for its orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BestTrial {
-    /// With that size, its height above no planet with the same.
+    /// The trial at that jitter, its height relative to no planet at the same jitter.
     pub trial: Trial,
-    /// Number of the size.
+    /// Index of the size.
     pub level: usize,
-    /// Height above no planet with the size that suits this best.
+    /// Height relative to no planet at the best jitter for no planet.
     pub delta_ln_l: f64,
 }
 
 impl BestTrial {
-    /// The trial with its height above no planet.
+    /// The trial with its height relative to no planet.
     pub fn trial_above_no_planet(&self) -> Trial {
         let delta_ln_l = self.delta_ln_l;
         Trial { orbit: self.trial.orbit.map(|orbit| CircularOrbit { delta_ln_l, ..orbit }), ..self.trial }
@@ -94,8 +94,8 @@ impl Jitters {
         Jitters { levels: vec![level], ln_shares: vec![0.0], null: None }
     }
 
-    /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet, with the
-    /// [`ln_prior`] of a scale.
+    /// Jitters added to the quadratic `without` one; `found_kms` is the standard deviation (km/s) found without a
+    /// planet; with the [`ln_prior`] of a scale.
     pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: Option<f64>) -> Self {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
@@ -127,7 +127,7 @@ impl Jitters {
         Jitters { levels, ln_shares: ln_shares(&SIZES), null: None }
     }
 
-    /// ln L of no planet with each size, times its share of a prior that is uniform up to the largest.
+    /// ln L of no planet at each size, weighted by a prior that is uniform up to the largest.
     pub fn ln_weights(&self) -> Vec<f64> {
         self.levels.iter().zip(&self.ln_shares).map(|(level, ln_share)| level.ln_l + ln_share).collect()
     }
@@ -137,14 +137,14 @@ impl Jitters {
         &self.levels
     }
 
-    /// The best orbit of one frequency (orbits a rotation cycle) beside the jitter that suits it best, its height above
-    /// no planet beside the jitter that suits this best. `None` where no orbit is bounded.
+    /// The best orbit of one frequency (orbits a rotation cycle) at its best jitter, its height relative to no planet
+    /// at the best jitter of that. `None` where no orbit is bounded.
     pub fn orbit_at(&self, frequency: f64) -> Option<CircularOrbit> {
         self.scan(&[frequency])[0].trial_above_no_planet().orbit
     }
 
-    /// The most likely amplitude of the velocities `unit`, its standard error, and its height above none, each beside
-    /// the jitter that suits it best.
+    /// The most likely amplitude of the velocities `unit`, its standard error, and its height above none, each at its
+    /// best jitter.
     pub fn amplitude(&self, unit: &DVector<f64>) -> [f64; 3] {
         let of = |level: &Level| {
             let [mean, sd] = level.quadratic.amplitude(unit);
@@ -153,8 +153,8 @@ impl Jitters {
         self.levels.iter().map(of).max_by(|a, b| a[2].total_cmp(&b[2])).unwrap_or([f64::NAN; 3])
     }
 
-    /// The height of the most likely amplitude of 0 or more of the velocities `unit`, beside the jitter that suits it
-    /// best, above none.
+    /// The height of the most likely amplitude of 0 or more of the velocities `unit` above none, each at its best
+    /// jitter.
     pub fn height_above_zero(&self, unit: &DVector<f64>) -> f64 {
         let of = |level: &Level| {
             let [mean, sd] = level.quadratic.amplitude(unit);
@@ -163,25 +163,24 @@ impl Jitters {
         self.levels.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Height of an orbit of these velocities (km/s) beside the jitter that suits it best above no planet beside the
-    /// jitter that suits this best.
+    /// Height of an orbit of these velocities (km/s) relative to no planet, each at its best jitter.
     pub fn delta_ln_l(&self, velocities: &DVector<f64>) -> f64 {
         let height = |level: &Level| level.ln_l + level.quadratic.log_likelihood(velocities);
         self.levels.iter().map(height).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// With the size that suits the star without a planet best.
+    /// At the best jitter of the star without a planet.
     pub fn as_found(&self) -> &Level {
         self.levels.iter().find(|level| level.ln_l == 0.0).unwrap_or(&self.levels[0])
     }
 
-    /// Whether there is none.
+    /// Whether there is no jitter.
     pub fn is_none(&self) -> bool {
         self.levels.len() == 1
     }
 
-    /// The best orbit at every frequency (orbits a rotation cycle), with the jitter that suits it best; where no orbit
-    /// is bounded, with none.
+    /// The best orbit at every frequency (orbits a rotation cycle), at its best jitter; without jitter where no orbit
+    /// is bounded.
     pub(super) fn scan(&self, frequencies: &[f64]) -> Vec<BestTrial> {
         let of_level = |(level, of): (usize, &Level)| {
             let height = |trial: &Trial| trial.orbit.map_or(f64::NEG_INFINITY, |orbit| of.ln_l + orbit.delta_ln_l);
@@ -201,8 +200,8 @@ impl Jitters {
     }
 }
 
-/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
-/// draws.
+/// The symmetric root of a covariance: unlike roots made of eigenvectors alone, it does not depend on their signs, nor
+/// do draws.
 pub(super) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let mut eigen = covariance.clone().symmetric_eigen();
     let still = STILL * eigen.eigenvalues.max();

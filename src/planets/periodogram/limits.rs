@@ -1,11 +1,11 @@
-//! What K can be at one period: the 95 % upper limit of the data at hand, and the K that a search would find.
+//! Limits on K at one period: the 95 % upper limit from the data, and the detection limit of the search.
 //!
 //! Upper limit: the posterior flat in K >= 0 and in phase is, along the direction u of phase in (a, b), the Gaussian
 //! `exp(b u K - u A u K^2 / 2)`. Its integral over K is an error function; that over phase is a sum over even steps,
 //! which for a periodic function is exact as soon as they resolve it. Detection limit: with an orbit of that K in the
 //! data, the whitened amplitude `w = L^-1 X' gradient` (`A = L L'`) is a normal deviate in the plane about `L' u K`;
-//! the chance that its length exceeds `sqrt(2 level)` is taken along its mean direction, with what scatter across adds
-//! to the length on average.
+//! the chance that its length exceeds `sqrt(2 level)` is taken along its mean direction, plus the mean contribution of
+//! the transverse noise to the length.
 
 use super::orbits::{Trial, eigenvalues};
 use crate::numerics::normal::cumulative;
@@ -13,13 +13,14 @@ use libm::erfc;
 use nalgebra::Vector2;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-/// Directions of phase for the upper limit: at least this many, and this many more for a phase known to a radian.
+/// Directions of phase for the upper limit: at least this many, plus this many per inverse radian of the phase
+/// uncertainty.
 const PHASES: f64 = 64.0;
 
-/// Phases over which a detection is averaged.
+/// Phases over which the detection probability is averaged.
 const DETECTION_PHASES: usize = 24;
 
-/// Halvings of the interval that holds a limit: to 1e-9 of it.
+/// Bisections of the interval that contains a limit: to 1e-9 of it.
 const HALVINGS: usize = 30;
 
 /// The largest x in [0, `high`] at which the rising function is at most `target`.
@@ -92,7 +93,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Against a Monte Carlo: draws of the Gaussian in (a, b) count 1/K each, which makes them flat in K and phase.
+    /// Against a Monte Carlo: draws of the Gaussian in (a, b) have weights 1/K, which makes them flat in K and phase.
     #[test]
     fn the_upper_limit_holds_its_share_of_the_posterior() {
         let cycles = uneven(25, 3.0);
@@ -110,7 +111,7 @@ mod tests {
                 all += 1.0 / k;
                 inside += if k < limit { 1.0 / k } else { 0.0 };
             }
-            // weights 1/K without end near K = 0 leave the Monte Carlo some parts in a thousand
+            // weights 1/K diverge near K = 0 and leave the Monte Carlo errors of some parts in a thousand
             assert!((inside / all - 0.95_f64).abs() < 4e-3, "{k}: {}", inside / all);
         }
     }

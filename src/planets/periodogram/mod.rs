@@ -43,17 +43,17 @@ use window::{window, window_peaks};
 /// Probability of the upper limit on K.
 const CREDENCE: f64 = 0.95;
 
-/// How a search is judged.
+/// Settings of the false-alarm probability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchSettings {
-    /// Number of such draws.
+    /// Number of draws without a planet.
     pub draws: usize,
     /// Seed of the draws.
     pub seed: u64,
 }
 
 impl SearchSettings {
-    /// Number of draws where nothing else is asked for.
+    /// Default number of draws.
     pub const DRAWS: usize = 10_000;
 }
 
@@ -63,7 +63,7 @@ impl Default for SearchSettings {
     }
 }
 
-/// One trial period with all that is said of it.
+/// One trial period with its limits and window function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// The trial.
@@ -78,16 +78,16 @@ pub struct Row {
     pub k_limit95_kms: Option<f64>,
 }
 
-/// A blind search: every trial period, the peaks, and how often stars without a planet show as high ones.
+/// A blind search: every trial period, the peaks, and the distribution for their false-alarm probabilities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
     /// The trial periods, from long to short.
     pub rows: Vec<Row>,
     /// The peaks, from high to low; there is one at least.
     pub peaks: Vec<Peak>,
-    /// The star's own periods, where spots imitate orbits.
+    /// The star's own periods, where spots mimic orbits.
     pub rotation: RotationPeriods,
-    /// Judges them.
+    /// Gives the false-alarm probability of peaks.
     pub false_alarm: FalseAlarm,
 }
 
@@ -109,7 +109,7 @@ impl Search {
         Search::with_jitter(&Jitters::none(quadratic), frequencies, settings)
     }
 
-    /// The same beside a velocity jitter of unknown size.
+    /// The same with an RV jitter of unknown size.
     ///
     /// # Errors
     /// [`Unbounded`].
@@ -129,7 +129,7 @@ impl Search {
         }
         let false_alarm = FalseAlarm::draw(jitters, &frequencies.per_cycle, settings.draws, settings.seed);
         let level = false_alarm.level(CANDIDATE_FAP);
-        // what would be found is told by the jitter of the star as it is
+        // detection limits use the jitter of the observed star
         let as_found = orbits::scan(quadratic, &frequencies.per_cycle);
         let row = |(best, as_found): (&BestTrial, &Trial)| Row {
             trial: best.trial_above_no_planet(),
@@ -142,7 +142,7 @@ impl Search {
         Ok(Search { rows, peaks, rotation, false_alarm })
     }
 
-    /// The same where spots imitate no orbits of several rotations.
+    /// The same where spots mimic no orbits of several rotations.
     #[must_use]
     pub fn without_multiples(mut self) -> Self {
         self.rotation = self.rotation.without_multiples();
@@ -158,6 +158,7 @@ impl Search {
     }
 }
 
+<<<<<<< HEAD
 /// sigma_K at the trial period closest to `Porb = Prot` over its median over periods away from it: how much worse an
 /// orbit is bounded where the star's spots imitate one. `None` where the data bound none there.
 pub fn co_rotation_penalty(rows: &[Row], frequencies: &Frequencies) -> Option<f64> {
@@ -166,6 +167,15 @@ pub fn co_rotation_penalty(rows: &[Row], frequencies: &Frequencies) -> Option<f6
     let here = closest.trial.orbit?.sigma_k_kms;
     let away = rows.iter().filter(|row| off(row) > 1.0);
     let mut others: Vec<f64> = away.filter_map(|row| Some(row.trial.orbit?.sigma_k_kms)).collect();
+=======
+/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is constrained
+/// where the star's spots mimic one. `None` where no orbit is bounded there.
+pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> Option<f64> {
+    let here = orbits::at(quadratic, 1.0).orbit?.sigma_k_kms;
+    let away = |trial: &&Trial| (trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;
+    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+    let mut others: Vec<f64> = trials.iter().filter(away).filter_map(|t| Some(t.orbit?.sigma_k_kms)).collect();
+>>>>>>> words
     others.sort_by(f64::total_cmp);
     others.get(others.len() / 2).map(|median| here / median)
 }

@@ -1,11 +1,11 @@
 //! RV offsets that all profiles of a night share, of unknown size, beside the orbit and a jitter of each profile.
 //!
-//! A spectrograph whose zero point changes from night to night looks like a planet of several days. A jitter s of each
-//! profile and offsets t of the nights have the covariance `J = L L'` with `L = [s 1 | t N]`, N telling which profile
-//! is of which night. Beside it ln L of information I and gradient g has the information `I - I M I` and the gradient
-//! `(1 - I M) g`, `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As
-//! beside a jitter alone (`jitter`), s and t are those that suit best, without an orbit and with each orbit. Stars
-//! without a planet have those that are the most likely without one.
+//! A spectrograph whose RV offset changes from night to night mimics a planet of several days. A jitter s of each
+//! profile and offsets t of the nights have the covariance `J = L L'` with `L = [s 1 | t N]`, N assigning profiles to
+//! nights. With it ln L of information I and gradient g has the information `I - I M I` and the gradient `(1 - I M) g`,
+//! `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As for a jitter
+//! alone (`jitter`), s and t are fitted without an orbit and with each orbit. Simulated stars without a planet have the
+//! values that are the most likely without one.
 
 use super::draws::amplitudes;
 use super::jitter::{Jitters, Level, Scatter, ln_prior, ln_shares, root};
@@ -15,36 +15,36 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Sizes of the jitter that are tried, of the one found without offsets.
+/// Trial jitters, in units of the one found without offsets.
 const JITTERS: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 
-/// Offsets of which the most likely is sought, of the scatter of the velocities: from the first to the last, each
-/// larger by a factor, within the [`Reach`].
+/// Trial offsets for the most likely one, in units of the rms of the velocities: first, last, and ratio, within the
+/// [`Reach`].
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
-/// Offsets that are tried with each orbit, of the most likely ones.
+/// Trial offsets with each orbit, in units of the most likely one.
 const PARTS: [f64; 4] = [0.0, 0.5, 1.0, 1.4];
 
-/// Stability of a spectrograph of which none is known (km/s): that of ESPaDOnS and Narval.
+/// Default stability of a spectrograph (km/s): that of ESPaDOnS and Narval.
 const USUAL_KMS: f64 = 0.03;
 
-/// Offsets that count in a search, of that.
+/// Largest offsets in a search, in units of the stability.
 const MOST: f64 = 2.0;
 
-/// Stars that are drawn to compare with 1 %.
+/// Simulated stars for a comparison with 1 %.
 const DRAWS: usize = 2_000;
 
-/// Nights of two profiles at least: fewer do not tell offsets from a jitter.
+/// Nights of two profiles at least: fewer do not distinguish offsets from a jitter.
 const NIGHTS: usize = 3;
 
-/// What offsets of nights make of a planet.
+/// Effect of nightly offsets on a planet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NightOffsets {
     /// Their most likely standard deviation without a planet (km/s).
     pub sigma_kms: f64,
-    /// By how much they raise ln L of a star without a planet, their prior counted.
+    /// By how much they raise ln L of a star without a planet, including their prior.
     pub gain: f64,
-    /// How often stars without it, with such offsets, show a peak as high, or of a known planet such a K.
+    /// False-alarm probability of the peak, or of K of a known planet, by stars without it that have such offsets.
     pub false_alarm_probability: f64,
 }
 
@@ -53,16 +53,16 @@ pub struct NightOffsets {
 pub enum Reach {
     /// Up to twice the stability of the spectrograph, all as probable.
     Stable,
-    /// Any, with the prior of a jitter: what would have to be wrong with the spectrograph.
+    /// Any, with the prior of a jitter: how unstable the spectrograph would have to be.
     Any,
 }
 
-/// Which profiles are of which night.
+/// Assignment of profiles to nights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nights(DMatrix<f64>);
 
 impl Nights {
-    /// The profiles of each night. `None` where they do not tell offsets from a jitter.
+    /// The profiles of each night. `None` where they do not distinguish offsets from a jitter.
     pub fn new(profiles: usize, nights: &[Vec<usize>]) -> Option<Self> {
         if nights.iter().filter(|night| night.len() > 1).count() < NIGHTS {
             return None;
@@ -74,12 +74,12 @@ impl Nights {
         Some(Nights(of_night))
     }
 
-    /// None.
+    /// No nights.
     pub(super) fn none(profiles: usize) -> Self {
         Nights(DMatrix::zeros(profiles, 0))
     }
 
-    /// Of the profiles that are left of `all`, both in the same order, by their rotation cycles.
+    /// The nights of a subset of `all` profiles, matched by their rotation cycles, both in the same order.
     #[must_use]
     pub fn of(&self, left: &[f64], all: &[f64]) -> Self {
         let mut left = left.iter().peekable();
@@ -93,13 +93,13 @@ impl Nights {
 pub struct Offsets {
     /// Their most likely standard deviation (km/s).
     pub sigma_kms: f64,
-    /// By how much they raise ln L, their prior counted.
+    /// By how much they raise ln L, including their prior.
     pub gain: f64,
 }
 
-/// The likelihood of the velocities beside a jitter, which is `found_kms` in a star without a planet and has a prior of
-/// that scale, the stability of the spectrograph, and offsets of `nights` within that `reach`. `None` where none are
-/// the most likely without a planet.
+/// The likelihood of the velocities with a jitter, found to be `found_kms` without a planet and with a prior of that
+/// scale, the stability of the spectrograph, and with offsets of `nights` within that `reach`. `None` where zero
+/// offsets are the most likely without a planet.
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -130,7 +130,7 @@ pub fn beside_offsets(
     if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
 }
 
-/// The same as beside offsets where these were sought: in `of_all` profiles, of which these are some.
+/// The same with the offsets found in `of_all` profiles, of which these are a subset.
 pub fn beside_offsets_of(
     of_all: &Jitters,
     without: &VelocityQuadratic,
@@ -140,7 +140,8 @@ pub fn beside_offsets_of(
     beside(without, nights, of_all.null?, jitter, Reach::Stable)
 }
 
-/// The same where `null` is the scatter of stars without a planet, and the jitter up to `found_kms`.
+/// The same where `null` has the jitter and offsets of stars without a planet, and the jitter reaches up to
+/// `found_kms`.
 pub(super) fn beside(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -156,7 +157,7 @@ pub(super) fn beside(
     Some(Jitters { levels: levels(without, &of(null)?, &all?), ln_shares: shares.collect(), null: Some(null) })
 }
 
-/// What offsets of nights, of any size, make of the highest peak, at one of the frequencies (orbits a rotation cycle).
+/// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).
 pub fn peak_beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -170,7 +171,7 @@ pub fn peak_beside_offsets(
     Some(NightOffsets { sigma_kms, gain, false_alarm_probability: alarm.probability(height).value() })
 }
 
-/// The same of a known planet, its velocities for a K of 1.
+/// The same for a known planet, given its velocities for K = 1.
 pub fn known_beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -201,7 +202,7 @@ impl Reach {
         within
     }
 
-    /// ln of the prior of an offset (km/s) beside that of none.
+    /// ln of the prior of an offset (km/s) relative to that of none.
     fn ln_prior(self, night_kms: f64, scale_kms: Option<f64>) -> f64 {
         match self {
             Reach::Stable => 0.0,
@@ -210,7 +211,7 @@ impl Reach {
     }
 }
 
-/// Sizes of a jitter that is `found_kms` without offsets.
+/// Trial jitters where the jitter is `found_kms` without offsets.
 fn jitters(found_kms: f64) -> Vec<f64> {
     if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] }
 }
@@ -221,15 +222,15 @@ pub(super) fn scatters(jitters_kms: &[f64], nights_kms: &[f64]) -> Vec<Scatter> 
     nights_kms.iter().copied().flat_map(with).collect()
 }
 
-/// The velocities beside a jitter and offsets.
+/// The velocities with a jitter and offsets.
 pub(super) struct Beside {
     /// L.
     columns: DMatrix<f64>,
     /// `C^-1 L'`, `A = C C'`: M is its square.
     pub solved: DMatrix<f64>,
-    /// `-ln det A / 2`, the prior counted.
+    /// `-ln det A / 2`, including the prior.
     pub constant: f64,
-    /// ln L at velocities 0, the prior counted, above that without jitter and offsets.
+    /// ln L at velocities 0, including the prior, relative to that without jitter and offsets.
     pub height: f64,
 }
 
@@ -257,13 +258,13 @@ impl Beside {
         Some(Beside { columns, solved, constant, height })
     }
 
-    /// From gradients without it to those beside it.
+    /// From gradients without the noise to those with it.
     pub fn left(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
         let n = information.nrows();
         DMatrix::identity(n, n) - information * self.solved.tr_mul(&self.solved)
     }
 
-    /// The likelihood of the velocities beside it, where gradients of stars without a planet have that `root`.
+    /// The likelihood of the velocities with this noise, where gradients of stars without a planet have that `root`.
     fn level(&self, without: &VelocityQuadratic, root: &DMatrix<f64>, best: f64) -> Level {
         let kept = self.left(&without.information);
         let information = &kept * &without.information;
@@ -282,7 +283,7 @@ impl Beside {
     }
 }
 
-/// The likelihood beside `all` of these, stars without a planet being those of `null`.
+/// The likelihood with `all` of these; stars without a planet are those of `null`.
 fn levels(without: &VelocityQuadratic, null: &Beside, all: &[Beside]) -> Vec<Level> {
     let moved = &without.information * &null.columns;
     let root = root(&(&without.information + &moved * moved.transpose()));

@@ -1,8 +1,8 @@
-//! Constant velocities beside an orbit: whether the systemic velocity is right, and how large the velocities are that
-//! all profiles, or those of one data set, have in common.
+//! Constant velocities beside an orbit: whether the systemic velocity is right, and the RV offsets common to all
+//! profiles or to those of one data set.
 //!
-//! A wrong systemic velocity does not stay in the mean: an orbit of another period takes it up. So the best orbit is
-//! searched for once more with the constant left free at every trial period.
+//! A wrong systemic velocity is absorbed in part by an orbit of another period. So the best orbit is searched for once
+//! more with the constant free at every trial period.
 
 use super::orbits::{design, mid_cycle, scan, velocities};
 use super::peaks::{Peak, parameters};
@@ -19,7 +19,7 @@ pub struct Offset {
     pub velocity_kms: f64,
     /// Its standard error (km/s), at that period.
     pub sigma_kms: f64,
-    /// ln L above that of the best orbit without a constant.
+    /// ln L relative to the best orbit without a constant.
     pub gain: f64,
 }
 
@@ -36,10 +36,10 @@ pub fn offset(quadratic: &VelocityQuadratic, frequencies: &[f64], best: f64) -> 
     Some(Offset { velocity_kms: slope / curvature, sigma_kms: curvature.sqrt().recip(), gain })
 }
 
-/// A velocity that several profiles have in common, with a Gaussian prior (km/s).
+/// A velocity common to several profiles, with a Gaussian prior (km/s).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Common {
-    /// How much of it each coordinate has, the velocities of profiles first: 1 or 0, or a polynomial in time.
+    /// Its factor for each coordinate, the velocities of profiles first: 1 or 0, or a polynomial in time.
     pub of_each: DVector<f64>,
     /// Mean of the prior (km/s).
     pub mean_kms: f64,
@@ -81,7 +81,7 @@ fn beside(quadratic: &VelocityQuadratic, peak: &Peak) -> Option<VelocityQuadrati
     let x = design(cycles, &[frequency]);
     let mid = mid_cycle(cycles);
     let by_frequency = |k: usize| TAU * (cycles[k] - mid) * (b * x[(k, 0)] - a * x[(k, 1)]);
-    // without an amplitude, or on the edge of a search, the period is not among what is fitted
+    // without an amplitude, or on the edge of a search, the period is not fitted
     let period = peak.sigma_porb_over_prot.and_then(|_| {
         let of_three = |k: usize, c: usize| if c < 2 { x[(k, c)] } else { by_frequency(k) };
         around.beside(&DMatrix::from_fn(cycles.len(), 3, of_three))
@@ -98,8 +98,8 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    /// Two data sets of one star with a planet, a constant between them that is not known, nor the systemic velocity:
-    /// the constant found lies within its errors, which are those of a fit of all five parameters.
+    /// Two data sets of one star with a planet, with an unknown offset between them and an unknown systemic velocity:
+    /// the offset found is true within its uncertainty, which is that of a fit of all five parameters.
     #[test]
     fn common_velocities_scatter_as_their_errors_say() {
         let cycles: Vec<f64> =
@@ -119,7 +119,7 @@ mod tests {
             let noise = sample::normal(n, seed).component_mul(&sigma);
             let rv = &orbit + 0.12 * &of_second + 0.05 * &all + noise;
             let quadratic = sample::independent(&cycles, &rv, &sigma);
-            // at the orbit that is the best beside constants
+            // at the best orbit with constants
             let x = DMatrix::from_columns(&[all.clone(), of_second.clone()]);
             let free = quadratic.beside(&x).unwrap();
             let peak = refined(&free, &frequencies, &truth);
@@ -142,7 +142,7 @@ mod tests {
             (whole[(0, 0)], whole[(1, 1)]) = (whole[(0, 0)] + 0.4f64.powi(-2), whole[(1, 1)] + 3f64.powi(-2));
             let expected = whole.try_inverse().unwrap()[(1, 1)].sqrt();
             assert!((errors[1] / expected - 1.0).abs() < 1e-4, "{} {expected}", errors[1]);
-            // the systemic velocity held, and the orbit: the error is too small by far
+            // with systemic velocity and orbit fixed, the standard error is far too small
             let held = common_velocities(&quadratic, &common[1..], None).unwrap().1[0];
             wide += u32::from(errors[1] > 1.3 * held);
         }

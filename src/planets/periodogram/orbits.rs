@@ -1,23 +1,23 @@
-//! The best circular orbit at each trial period: a generalised least-squares sine fit (Zechmeister & Kurster 2009) in
-//! which the weights are the whole information matrix of the velocities (`docs/method.md` section 4).
+//! The best circular orbit at each trial period: a generalised least-squares sine fit (Zechmeister & Kurster 2009)
+//! whose weights are the full information matrix of the velocities (`docs/method.md` section 4).
 //!
 //! With `theta = 2 pi (E - E_mid) / P` the velocities are `V = X (a, b)`, the columns of X being cos and sin of theta.
-//! Then `ln L = b' (a, b) - (a, b) A (a, b) / 2` with `A = X' I X` and `b = X' g`; its maximum is `b' A^-1 b / 2` above
-//! no planet. Periods are in rotation cycles. The systemic velocity is not fitted along: it is the star's, as all else
-//! is that the quadratic holds fixed or has marginalised.
+//! Then `ln L = b' (a, b) - (a, b) A (a, b) / 2` with `A = X' I X` and `b = X' g`; its maximum is `b' A^-1 b / 2`
+//! relative to no planet. Periods are in rotation cycles. The systemic velocity is not fitted here: like other
+//! parameters of the star it is fixed or marginalised over in the quadratic.
 
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Trial periods that share one matrix product.
+/// Trial periods per matrix product.
 const BLOCK: usize = 128;
 
-/// Two velocities (a, b) are not told apart where the curvature along one is below this part of the whole information.
+/// Two velocities (a, b) are degenerate where the curvature along one is below this fraction of the total information.
 const SINGULAR: f64 = 1e-9;
 
-/// Standard deviation of a phase of which nothing is known (cycles).
+/// Standard deviation of a uniform phase (cycles).
 pub const SIGMA_OF_UNKNOWN_PHASE: f64 = 0.288_675_134_594_812_9;
 
 /// ln L at one trial period, as a quadratic in (a, b).
@@ -42,13 +42,13 @@ pub struct CircularOrbit {
     pub sigma_k_kms: f64,
     /// Phase in [0, 1) (cycles).
     pub phi: f64,
-    /// Its standard error at this period, at most that of a phase of which nothing is known.
+    /// Its standard error at this period, at most that of a uniform phase.
     pub sigma_phi: f64,
-    /// ln L above that of no planet.
+    /// ln L relative to no planet.
     pub delta_ln_l: f64,
 }
 
-/// The middle of the time base (rotation cycles), from which phases are counted inside.
+/// The middle of the time base (rotation cycles), from which phases are counted internally.
 pub fn mid_cycle(cycles: &[f64]) -> f64 {
     let lo = cycles.iter().copied().fold(f64::INFINITY, f64::min);
     let hi = cycles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -100,8 +100,8 @@ pub fn at(quadratic: &VelocityQuadratic, frequency: f64) -> Trial {
     scan(quadratic, &[frequency])[0]
 }
 
-/// Information on (a, b) of an orbit at one frequency with the amplitudes of one at another left free, of which the
-/// prior has the information `prior` (s^2/km^2). `None` where either is not bounded.
+/// Information on (a, b) of an orbit at one frequency with the amplitudes of an orbit at another free under a prior of
+/// information `prior` (s^2/km^2). `None` where either is not bounded.
 pub fn between(quadratic: &VelocityQuadratic, frequency: f64, other: f64, prior: f64) -> Option<Matrix2<f64>> {
     let x = design(&quadratic.cycles, &[frequency, other]);
     let a = x.tr_mul(&(&quadratic.information * &x));
@@ -112,14 +112,14 @@ pub fn between(quadratic: &VelocityQuadratic, frequency: f64, other: f64, prior:
     (prior > 0.0 || eigenvalues(&rest).0 > least).then_some(rest)
 }
 
-/// Smallest and largest eigenvalue of a symmetric matrix; NaN if it holds one.
+/// Smallest and largest eigenvalue of a symmetric matrix; NaN if it contains one.
 pub(super) fn eigenvalues(m: &Matrix2<f64>) -> (f64, f64) {
     let (mean, half) = (0.5 * m.trace(), 0.5 * (m[(0, 0)] - m[(1, 1)]));
     let spread = half.hypot(m[(0, 1)]);
     (mean - spread, mean + spread)
 }
 
-/// (a, b) where ln L is highest, their covariance, and that height. `None` where some direction is not bounded.
+/// (a, b) where ln L is highest, their covariance, and that height. `None` where some direction is unbounded.
 fn best(a: Matrix2<f64>, b: Vector2<f64>, least: f64) -> Option<(Vector2<f64>, Matrix2<f64>, f64)> {
     let bounded = eigenvalues(&a).0 > least;
     let covariance = a.try_inverse().filter(|_| bounded)?;
@@ -185,7 +185,7 @@ mod tests {
         }
     }
 
-    /// Where time is counted from turns the phase and nothing else.
+    /// The origin of time changes only the phase.
     #[test]
     fn the_origin_of_time_does_not_matter() {
         let cycles = uneven(30, 4.0);

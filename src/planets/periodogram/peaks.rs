@@ -1,7 +1,8 @@
-//! The peaks of the periodogram, each refined between the trial periods, with errors that count the period's own.
+//! The peaks of the periodogram, each refined between the trial periods, with uncertainties that include that of the
+//! period.
 //!
-//! At a peak ln L is expanded in (a, b, frequency) of the circular orbit; the inverse of that curvature gives the
-//! errors of K, period and phase together.
+//! At a peak ln L is expanded in (a, b, frequency) of the circular orbit; the inverse of that curvature is the
+//! covariance of K, period and phase together.
 
 use super::frequencies::Frequencies;
 use super::jitter::{BestTrial, Jitters};
@@ -14,13 +15,13 @@ use crate::planets::verdict::Signal;
 use nalgebra::{DVector, Matrix3, Vector2, Vector3};
 use std::f64::consts::TAU;
 
-/// Peaks this far below the highest are kept.
+/// Peaks up to this far below the highest are kept.
 const KEPT_BELOW: f64 = 6.0;
 
-/// So many are kept in any case, and no more than the second number.
+/// The least and largest numbers of peaks kept.
 const KEPT: (usize, usize) = (5, 30);
 
-/// Peaks closer than this many inverse time bases are one.
+/// Peaks closer than this many inverse time bases count as one.
 const SAME_PEAK: f64 = 0.1;
 
 /// A maximum of ln L over orbits.
@@ -30,7 +31,7 @@ pub struct Peak {
     pub porb_over_prot: f64,
     /// Its standard error; `None` on the edge of the search.
     pub sigma_porb_over_prot: Option<f64>,
-    /// The orbit; where the period has an error, those of K and phase count it.
+    /// The orbit; where the period has a standard error, those of K and phase include it.
     pub orbit: CircularOrbit,
     /// Covariance of K (km/s), period over rotation period and phase (cycles); `None` on the edge of the search.
     pub covariance: Option<Matrix3<f64>>,
@@ -38,12 +39,12 @@ pub struct Peak {
     pub on_edge: bool,
     /// How it is an alias of the highest peak.
     pub alias: Option<Alias>,
-    /// The period of the star that it is not told from: spots imitate orbits there.
+    /// The period of the star with which it is consistent: spots mimic orbits there.
     pub imitation: Option<Imitation>,
 }
 
 impl Peak {
-    /// The orbit that a verdict is on.
+    /// The orbit for a verdict.
     pub fn signal(&self, rotation_period_d: f64) -> Signal {
         Signal {
             period_d: rotation_period_d * self.porb_over_prot,
@@ -54,8 +55,8 @@ impl Peak {
     }
 }
 
-/// Shares of the posterior that peaks have among themselves: heights times volumes of their Gaussians, under priors
-/// uniform in K and phase and log-uniform in the period. A peak on the edge of the search has none.
+/// Posterior shares of the peaks relative to each other: heights times volumes of their Gaussians, under priors uniform
+/// in K and phase and log-uniform in the period. A peak on the edge of the search has none.
 pub fn posterior_shares(peaks: &[&Peak]) -> Vec<f64> {
     let highest = peaks.iter().map(|peak| peak.orbit.delta_ln_l).fold(f64::NEG_INFINITY, f64::max);
     let weight = |peak: &&Peak| {
@@ -74,7 +75,7 @@ pub(super) fn parameters(cycles: &[f64], peak: &Peak) -> DVector<f64> {
     DVector::from_vec(vec![ab.x, ab.y, frequency])
 }
 
-/// Steps in (a, b, frequency) by which velocities are differentiated.
+/// Steps in (a, b, frequency) for numerical derivatives of velocities.
 pub(super) fn steps(k_kms: f64, time_base_cycles: f64) -> [f64; 3] {
     let step = 1e-3 * k_kms.max(1e-3);
     [step, step, 1e-3 / time_base_cycles]
@@ -212,7 +213,7 @@ mod tests {
         }
     }
 
-    /// The errors are the scatter of the best orbit from one noise to the next.
+    /// The standard errors equal the standard deviation of the best orbit over realisations of the noise.
     #[test]
     fn errors_are_the_scatter_of_the_estimates() {
         let cycles = uneven(40, 5.0);

@@ -7,10 +7,10 @@
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 
-/// The search ends when a step promises less than this in ln L.
+/// The search ends when the predicted gain of a step in ln L is less than this.
 const SMALLEST_GAIN: f64 = 1e-11;
 
-/// Steps at most, whether they succeed or not.
+/// Largest number of steps, accepted or not.
 const MOST_STEPS: usize = 200;
 
 /// A maximum of ln L.
@@ -18,17 +18,17 @@ const MOST_STEPS: usize = 200;
 pub(super) struct Maximum {
     /// The parameters.
     pub theta: DVector<f64>,
-    /// ln L above no planet.
+    /// ln L relative to no planet.
     pub delta_ln_l: f64,
     /// Inverse of minus the second derivative; `None` where that is not positive definite.
     pub covariance: Option<DMatrix<f64>>,
 }
 
-/// Velocities (km/s) that depend on parameters, with the steps by which they are differentiated.
+/// Velocities (km/s) that depend on parameters, with steps for numerical derivatives.
 pub(super) struct Model<'a> {
-    /// The velocities, `None` where parameters make no sense.
+    /// The velocities, `None` for invalid parameters.
     pub velocities: &'a dyn Fn(&DVector<f64>) -> Option<DVector<f64>>,
-    /// A step in each parameter that changes the velocities by little.
+    /// A step in each parameter that changes the velocities only slightly.
     pub steps: DVector<f64>,
 }
 
@@ -68,7 +68,7 @@ impl Model<'_> {
         Some(&half + half.transpose())
     }
 
-    /// Climbs from `start` to the next maximum. `None` if the start makes no sense.
+    /// Climbs from `start` to the next maximum. `None` if the start is invalid.
     pub fn climb(&self, quadratic: &VelocityQuadratic, start: DVector<f64>) -> Option<Maximum> {
         let ln_l = |theta: &DVector<f64>| (self.velocities)(theta).map(|v| quadratic.log_likelihood(&v));
         let (mut theta, mut height, mut damping) = (start.clone(), ln_l(&start)?, 1e-3);

@@ -1,27 +1,26 @@
-//! Periods at which spots imitate orbits: the rotation period, its multiples and fractions, and their aliases by the
+//! Periods at which spots mimic orbits: the rotation period, its multiples and fractions, and their aliases by the
 //! sampling and by the day.
 //!
-//! Spots return with the rotation and distort each line several times on their way across the disc, which gives signals
-//! at `Prot/n`; where they change, or the sampling sees every other rotation, at multiples, too. Profiles taken from
-//! one place come once a day, so that each of these has reflections at one and two a day (Dawson & Fabrycky 2010),
-//! however weak the window function is there.
+//! Spots return with the rotation and distort each line several times as they cross the disc, which gives signals at
+//! `Prot/n`; where they evolve, or only every other rotation is sampled, at multiples as well. Profiles from one site
+//! are taken once a day, so that each of these has reflections at one and two a day (Dawson & Fabrycky 2010), however
+//! weak the window function is there.
 
 use super::window::{Alias, SAME, WindowPeak, alias, is_same_frequency, window};
 use serde::{Deserialize, Serialize};
 
-/// Fractions and multiples of the rotation period that are looked at.
+/// Fractions and multiples of the rotation period that are considered.
 const FRACTIONS: u32 = 4;
 
 fn usual_multiples() -> u32 {
     4
 }
 
-/// A period is told from another if its frequency differs by more than so many standard errors, but for the second
-/// number (in inverse time bases) within which it never is: spots that change or rotate differentially do not keep
-/// their period.
+/// Two periods are distinguished if their frequencies differ by more than this many standard errors, and by more than
+/// the second number (in inverse time bases): evolving or differentially rotating spots do not keep their period.
 const TOLD_APART: (f64, f64) = (3.0, 0.2);
 
-/// The sampling sees the day where its window function is at least this high at one or two a day.
+/// The sampling has daily aliases where its window function is at least this high at one or two a day.
 const DAILY: f64 = 0.1;
 
 /// A period of the star, `numerator / denominator` rotations, and perhaps an alias of it.
@@ -46,13 +45,18 @@ impl Imitation {
         }
     }
 
-    /// Whether spots are likely to make a signal there: at the rotation period, its fractions and multiples, and at
-    /// aliases of the first two, where most of their power is. Aliases of all others fill a large part of all periods.
+    /// Whether spots are likely to produce a signal there: at the rotation period, its fractions and multiples, and at
+    /// aliases of the first two, where most of their power is. Aliases of all others cover a large fraction of all
+    /// periods.
     pub fn is_likely(&self) -> bool {
         self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
     }
 
+<<<<<<< HEAD
     /// In a few words: `consistent with 2 P_rot`, `alias of P_rot/3 at 1.003/d`.
+=======
+    /// A short description: `consistent with 2 Prot`, `alias of Prot/3 at 1.003/d`.
+>>>>>>> words
     pub fn words(&self, rotation_period_d: f64) -> String {
         match &self.alias {
             None => format!("consistent with {}", self.period()),
@@ -66,18 +70,19 @@ impl Imitation {
 /// The star's own periods under a sampling.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RotationPeriods {
-    /// What makes aliases: strong peaks of the window function, and the day where the sampling sees it.
+    /// Frequencies that cause aliases: strong peaks of the window function, and the day where the sampling has daily
+    /// aliases.
     pub window: Vec<WindowPeak>,
     /// Time base in rotation cycles.
     pub time_base_cycles: f64,
-    /// The largest multiple of the rotation period that is looked at. Where spots may change it is 1: the field knows
-    /// that they return with each rotation, and how long they live.
+    /// The largest multiple of the rotation period considered. It is 1 for evolving spots: the field describes their
+    /// return with each rotation and their lifetime.
     #[serde(default = "usual_multiples")]
     pub multiples: u32,
 }
 
 impl RotationPeriods {
-    /// Of profiles at `cycles` of a star with that rotation period, whose window function has these strong `peaks`.
+    /// For profiles at `cycles` of a star with that rotation period, whose window function has these strong `peaks`.
     pub fn new(cycles: &[f64], rotation_period_d: f64, peaks: &[WindowPeak], time_base_cycles: f64) -> Self {
         let mut all = peaks.to_vec();
         for days in [1.0, 2.0] {
@@ -91,14 +96,14 @@ impl RotationPeriods {
         RotationPeriods { window: all, time_base_cycles, multiples: usual_multiples() }
     }
 
-    /// The same where spots may change: of several rotations none is looked at.
+    /// The same for evolving spots: no multiples of the rotation period are considered.
     #[must_use]
     pub fn without_multiples(self) -> Self {
         RotationPeriods { multiples: 1, ..self }
     }
 
-    /// The star's period that `porb_over_prot`, known to `sigma`, is not told from, if there is one: itself rather than
-    /// an alias, and fractions rather than multiples.
+    /// The star's period with which `porb_over_prot`, known to `sigma`, is consistent, if any: a period rather than an
+    /// alias, and fractions rather than multiples.
     pub fn imitated(&self, porb_over_prot: f64, sigma: Option<f64>) -> Option<Imitation> {
         let frequency = 1.0 / porb_over_prot;
         let sigma = sigma.filter(|s| s.is_finite()).unwrap_or(f64::INFINITY) * frequency * frequency;
@@ -125,8 +130,8 @@ impl RotationPeriods {
 mod tests {
     use super::*;
 
-    /// LO Peg's rotation, nights and the peaks that its spots make: 1.985 rotations, and 0.7308 d, which is 2.363/d
-    /// less 1/d.
+    /// LO Peg's rotation, nights and the peaks due to its spots: 1.985 rotations, and 0.7308 d, which is 2.363/d less
+    /// 1/d.
     #[test]
     fn multiples_and_daily_aliases_are_named() {
         let rotation_period_d = 0.4232;
@@ -151,7 +156,8 @@ mod tests {
         assert_eq!(all.imitated(1.0, Some(0.01)), own.imitated(1.0, Some(0.01)));
     }
 
-    /// A period that is five of its errors from two rotations is another one, however few rotations were seen.
+    /// A period five standard errors away from two rotations is distinguished from it, however few rotations were
+    /// observed.
     #[test]
     fn what_is_told_apart_is_not_flagged() {
         let cycles: Vec<f64> = (0..50).map(|k| 0.06 * f64::from(k)).collect();

@@ -1,4 +1,4 @@
-//! Velocities for the tests of this module: orbits, deviates, and quadratics made of them.
+//! Velocities for the tests of this module: orbits, deviates, and quadratics.
 
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
@@ -34,7 +34,7 @@ pub fn independent(cycles: &[f64], rv: &DVector<f64>, sigma: &DVector<f64>) -> V
     with_information(cycles, rv, DMatrix::from_diagonal(&sigma.map(|s| 1.0 / (s * s))))
 }
 
-/// The quadratic of velocities with errors of some 0.05 km/s that have to do with each other.
+/// The quadratic of velocities with correlated uncertainties of some 0.05 km/s.
 pub fn correlated(cycles: &[f64], rv: &DVector<f64>, seed: u64) -> VelocityQuadratic {
     let n = cycles.len();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -1,9 +1,9 @@
-//! A second planet: the gain in ln L of two circular orbits over one, the period of the first kept, then both refined
-//! together.
+//! A second planet: the gain in ln L of two circular orbits over one, first with the period of the first fixed, then
+//! with both refined together.
 //!
-//! At each period the 4 x 4 system in both (a, b) is solved by blocks: with the first orbit's pair eliminated, what is
-//! left is a quadratic in the velocities again. The periodogram of that is the gain, and gradients without a second
-//! planet scatter with its own information.
+//! At each period the 4 x 4 system in both (a, b) is solved by blocks: eliminating the first orbit's pair gives a
+//! quadratic in the velocities again. Its periodogram is the gain, and gradients without a second planet have its
+//! information as covariance.
 
 use super::frequencies::Frequencies;
 use super::orbits::{at, design, velocities};
@@ -12,16 +12,16 @@ use super::refine::{Maximum, Model};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DVector, Vector2, Vector3};
 
-/// Two orbits with their errors from the curvature in all six parameters.
+/// Two orbits with standard errors from the curvature in all six parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoOrbits {
     /// The first orbit, then the second. Their Delta ln L is that of both together.
     pub orbits: [Peak; 2],
-    /// ln L of both above that of the first alone, in the same quadratic.
+    /// ln L of both relative to the first alone, in the same quadratic.
     pub gain: f64,
 }
 
-/// The quadratic with the orbit of that frequency (orbits a rotation cycle) left free; `None` where it is not bounded.
+/// The quadratic with the orbit of that frequency (orbits a rotation cycle) left free; `None` where it is unbounded.
 pub fn without(quadratic: &VelocityQuadratic, frequency: f64) -> Option<VelocityQuadratic> {
     quadratic.beside(&design(&quadratic.cycles, &[frequency]))
 }
@@ -41,7 +41,7 @@ pub fn both(
         (lo..=hi).contains(&frequency).then(|| velocities(cycles, frequency, Vector2::new(theta[i], theta[i + 1])))
     };
     let sum = |theta: &DVector<f64>| Some(orbit(theta, 0)? + orbit(theta, 3)?);
-    // the first orbit as it is beside the second
+    // the first orbit, fitted with the second
     let frequency = 1.0 / first.porb_over_prot;
     let start_second = parameters(cycles, second);
     let taken = orbit(&start_second, 0)?;

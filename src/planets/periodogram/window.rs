@@ -1,8 +1,8 @@
-//! The window function of the sampling, and peaks that are aliases of the highest by it.
+//! The window function of the sampling, and peaks that it makes aliases of the highest.
 //!
-//! `W(f) = |sum_k exp(2 pi i f E_k)|^2 / N^2` is 1 where the profiles always catch an orbit of that frequency at the
-//! same phase. A strong peak of it at F makes orbits of frequency f and of `F - f`, `F + f` or `f - F` look alike
-//! (Dawson & Fabrycky 2010).
+//! `W(f) = |sum_k exp(2 pi i f E_k)|^2 / N^2` is 1 where all profiles sample an orbit of that frequency at the same
+//! phase. A strong peak of it at F makes orbits of frequency f and of `F - f`, `F + f` or `f - F` look alike (Dawson &
+//! Fabrycky 2010).
 
 use super::frequencies::Frequencies;
 use rayon::prelude::*;
@@ -12,13 +12,13 @@ use std::f64::consts::TAU;
 /// A window peak of at least this height makes aliases.
 const STRONG: f64 = 0.25;
 
-/// Samples of the window to each inverse time base.
+/// Samples of the window per inverse time base.
 const SAMPLES: f64 = 10.0;
 
 /// Frequencies closer than this many inverse time bases are the same.
 pub(super) const SAME: f64 = 0.5;
 
-/// Whether a time base does not tell two frequencies apart.
+/// Whether two frequencies are unresolved by a time base.
 pub fn is_same_frequency(one: f64, other: f64, time_base_cycles: f64) -> bool {
     (one - other).abs() * time_base_cycles < SAME
 }
@@ -48,8 +48,8 @@ pub fn window(cycles: &[f64], frequency: f64) -> f64 {
     (sin * sin + cos * cos) / (cycles.len() as f64).powi(2)
 }
 
-/// Strong peaks of the window function up to the sum of any two of the `frequencies`, but for those so low that they
-/// join what is the same anyway.
+/// Strong peaks of the window function up to the sum of any two of the `frequencies`, except at frequencies so low that
+/// they join unresolved ones.
 pub fn window_peaks(cycles: &[f64], frequencies: &Frequencies) -> Vec<WindowPeak> {
     let base = frequencies.time_base_cycles;
     let last = 2.0 * frequencies.range().1 + SAME / base;
@@ -64,7 +64,7 @@ pub fn window_peaks(cycles: &[f64], frequencies: &Frequencies) -> Vec<WindowPeak
         .collect()
 }
 
-/// How `frequency` is an alias of `of`, to `within` that much, if it is; by the strongest window peak that joins them.
+/// How `frequency` is an alias of `of`, within `within`, if it is; by the strongest window peak that joins them.
 pub fn alias(frequency: f64, of: f64, peaks: &[WindowPeak], within: f64) -> Option<Alias> {
     let joins = |peak: &WindowPeak| {
         let fits = |f: f64| (f - peak.frequency).abs() < within;

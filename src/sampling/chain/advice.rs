@@ -1,15 +1,15 @@
-//! What to do about a chain that has not converged, or in which something looks wrong.
+//! Advice on a chain that has not converged or looks wrong.
 //!
 //! Steps still needed are an estimate: ESS grows with the number of steps, and `R-hat^2 - 1` falls with it.
 
 use crate::sampling::chain::{Chain, Convergence, Diagnostic, Goals};
 
-/// Share of failed evaluations that is worth a remark.
+/// Fraction of failed evaluations from which they are reported.
 const MANY_FAILURES: f64 = 0.05;
-/// Most that is advised to be added at once, in lengths of what there is: beyond, an estimate is worth nothing.
+/// Largest advised extension, in present lengths of the chain: beyond, the estimate is unreliable.
 const MOST: f64 = 10.0;
 
-/// Advice, most important first; empty for a converged chain without failures to speak of.
+/// Advice, most important first; empty for a converged chain without significant failures.
 pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<String> {
     let mut advice = Vec::new();
     if chain.shape().ensembles < 2 {
@@ -40,7 +40,7 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
     advice
 }
 
-/// What parameters lack, in one piece of advice: each with its numbers, and how many steps all of them need.
+/// One piece of advice on all unconverged parameters: each with its numbers, and the steps required.
 fn steps_needed(names: &[String], convergence: &Convergence, goals: &Goals) -> Option<String> {
     let lacks = |(name, one): (&String, &Diagnostic)| {
         let (Some(rhat), Some(ess)) = (one.rhat, one.ess) else {
@@ -61,7 +61,7 @@ fn steps_needed(names: &[String], convergence: &Convergence, goals: &Goals) -> O
     Some(format!("{}: run `--extend {more}` ({bound} {more} steps more needed)", lacking.join("; ")))
 }
 
-/// Factor by which the chain must still grow for every parameter to reach the goals; `None` if one cannot tell yet.
+/// Factor by which the chain must still grow for every parameter to reach the goals; `None` if unknown yet.
 pub fn growth_needed(convergence: &Convergence, goals: &Goals) -> Option<f64> {
     convergence.diagnostics.iter().map(|one| growth(one, goals)).try_fold(1.0, |most: f64, one| Some(most.max(one?)))
 }
@@ -72,7 +72,7 @@ fn growth(one: &Diagnostic, goals: &Goals) -> Option<f64> {
     Some(((rhat * rhat - 1.0) / (goals.rhat * goals.rhat - 1.0)).max(goals.ess / ess).max(1.0))
 }
 
-/// Up to a multiple of 50, the interval at which goals are looked at.
+/// Up to a multiple of 50, the interval at which goals are checked.
 fn round_up(steps: f64) -> usize {
     ((steps / 50.0).ceil() as usize).max(1) * 50
 }

@@ -50,7 +50,7 @@ pub fn autocorrelation_function(series: &Series, lags: usize) -> Vec<f64> {
 
 /// Integrated autocorrelation time of series from which the mean is already subtracted, averaging the autocovariances.
 ///
-/// All series must be of one length. `None` when it is under 4 or nothing varies.
+/// All series must have one length. `None` when it is under 4 or nothing varies.
 pub fn integrated_time(centred: &[Vec<f64>]) -> Option<IntegratedTime> {
     let steps = centred.first()?.len();
     if steps < 4 {
@@ -72,7 +72,7 @@ pub fn integrated_time(centred: &[Vec<f64>]) -> Option<IntegratedTime> {
     Some(IntegratedTime { tau, variance, closed: false })
 }
 
-/// Mean of the values; 0 of none.
+/// Mean of the values; 0 for none.
 pub(crate) fn mean<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0usize), |(sum, count), x| (sum + x, count + 1));
     if count == 0 { 0.0 } else { sum / count as f64 }

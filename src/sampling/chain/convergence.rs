@@ -2,13 +2,13 @@
 //!
 //! - **R-hat** (Gelman & Rubin 1992; Vehtari et al. 2021): each ensemble is cut into an early and a late half, each
 //!   half being one group with all its walkers pooled. Values are replaced by the normal scores of their ranks, and
-//!   `R-hat = sqrt(((N - 1)/N W + B) / W)` with N draws a group, W the mean variance within groups and B the variance
+//!   `R-hat = sqrt(((N - 1)/N W + B) / W)` with N draws per group, W the mean variance within groups and B the variance
 //!   of the group means. The larger of the values' own and that of their distances from the median (folded) is taken.
 //! - **ESS** = V / Var(grand mean), V the variance of all draws pooled. Walkers of one ensemble are not independent, so
 //!   Var(grand mean) comes from the series of ensemble means: `C(0) tau / (E n)`, C the autocovariance *around the
-//!   grand mean* averaged over ensembles, tau its integrated time (at least 1). It is not let below what the scatter
-//!   between ensemble means supports: `B_E / (E q)`, with q such that chance alone exceeds it once in a hundred times.
-//! - **Periodic** parameters are judged by cosine and sine, and the worse of the two counts.
+//!   grand mean* averaged over ensembles, tau its integrated time (at least 1). It is at least the value from the
+//!   scatter between ensemble means: `B_E / (E q)`, with q such that chance alone exceeds it once in a hundred times.
+//! - **Periodic** parameters are assessed by cosine and sine, and the worse of the two counts.
 //! - **Burn-in**: the smaller of half the chain and 5 times the largest autocorrelation time of its second half.
 
 use crate::sampling::chain::autocorrelation::{autocorrelation_time, integrated_time, mean};
@@ -16,27 +16,27 @@ use crate::sampling::chain::{Chain, ChainError, Series};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// What sort of number a parameter is.
+/// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
     /// Any number.
     Linear,
     /// Periodic with period 1 (cycles).
     Periodic,
-    /// An amplitude: not negative, with 0 meaning that there is nothing.
+    /// An amplitude: not negative, with 0 for no signal.
     Amplitude,
 }
 
-/// What every parameter must reach.
+/// Goals for every parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goals {
-    /// R-hat at most this.
+    /// Largest R-hat.
     pub rhat: f64,
-    /// ESS at least this.
+    /// Smallest ESS.
     pub ess: f64,
 }
 
-/// How far one parameter can be trusted. `None` where the chain is too short, or the parameter does not vary.
+/// Convergence of one parameter. `None` where the chain is too short, or the parameter does not vary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Diagnostic {
     /// R-hat between ensembles.
@@ -48,7 +48,7 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// Of one quantity.
+    /// The convergence of one quantity.
     pub fn of(series: Series, kind: ParameterKind) -> Self {
         diagnose(&facets(series, kind))
     }
@@ -64,18 +64,18 @@ impl Diagnostic {
 pub struct Convergence {
     /// Steps left out at the beginning.
     pub discarded: usize,
-    /// Steps that count.
+    /// Steps kept.
     pub kept: usize,
-    /// One a parameter, in the order of the names.
+    /// One per parameter, in the order of the names.
     pub diagnostics: Vec<Diagnostic>,
-    /// Walkers (ensemble, walker) that do not move any more.
+    /// Walkers (ensemble, walker) that no longer move.
     pub stuck: Vec<(usize, usize)>,
     /// Number of independent ensembles.
     pub ensembles: usize,
 }
 
 impl Convergence {
-    /// Judges a chain. The result depends on the chain alone, not on the number of threads.
+    /// Assesses a chain. The result depends only on the chain, not on the number of threads.
     ///
     /// # Errors
     /// [`ChainError::Kinds`] when `kinds` does not match the parameters, [`ChainError::Empty`].
@@ -108,20 +108,20 @@ impl Convergence {
         Ok(Convergence { discarded, kept, diagnostics, stuck: stuck(chain, discarded), ensembles })
     }
 
-    /// Length of what is kept in the longest of the autocorrelation times; 0 where one is unknown.
+    /// Length of the kept steps in longest autocorrelation times; 0 where one is unknown.
     pub fn kept_times(&self) -> f64 {
         let longest = worst(self.diagnostics.iter().map(|one| one.tau), f64::max);
         longest.map_or(0.0, |tau| self.kept as f64 / tau.max(1.0))
     }
 
-    /// Whether every parameter has reached the goals and no walker is stuck. One ensemble alone never has: there is
-    /// nothing independent to compare it with.
+    /// Whether every parameter has reached the goals and no walker is stuck. A single ensemble never has: there is no
+    /// independent one to compare it with.
     pub fn reached(&self, goals: &Goals) -> bool {
         self.ensembles > 1 && self.stuck.is_empty() && self.diagnostics.iter().all(|one| one.reached(goals))
     }
 }
 
-/// The series that a parameter is judged by.
+/// The series by which a parameter is assessed.
 fn facets(series: Series, kind: ParameterKind) -> Vec<Series> {
     if kind != ParameterKind::Periodic {
         return vec![series];
@@ -191,7 +191,7 @@ fn normal_scores(groups: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
     order.sort_unstable_by(|&a, &b| values[a as usize].total_cmp(&values[b as usize]));
     let mut scores = vec![0.0; values.len()];
     for ties in order.chunk_by(|&a, &b| values[a as usize] == values[b as usize]) {
-        // Ranks are counted along `order`; the chunk's address in it gives the first.
+        // Ranks are counted along `order`; the chunk's offset in it gives the first.
         let first = (ties.as_ptr() as usize - order.as_ptr() as usize) / size_of::<u32>();
         let rank = first as f64 + 0.5 * (ties.len() as f64 + 1.0);
         let score = normal_quantile((rank - 0.375) / (values.len() as f64 + 0.25));

@@ -1,8 +1,8 @@
 //! Quantities that follow from the parameters of a draw: computed for each draw, summarised like parameters.
 //!
-//! An event that comes back with a period, of which the draws say time and period, is counted from a given time t0: the
-//! phase `(T - t0) / P` is unwrapped around its mode, as a periodic parameter is, and the turn is that whose median is
-//! nearest to t0. Where period or phase are hardly known the intervals are as wide as that.
+//! A recurring event, whose time and period the draws give, is counted from a given time t0: the phase `(T - t0) / P`
+//! is unwrapped around its mode, as a periodic parameter is, and the cycle is that whose median is nearest to t0.
+//! Poorly constrained periods or phases give wide intervals.
 
 use super::convergence::{Diagnostic, ParameterKind};
 use super::parameter::{ParameterSummary, parameter_summary};
@@ -12,19 +12,19 @@ use crate::numerics::quantile::quantile;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// What a draw says, by its parameters in the order of the chain.
+/// A function of a draw's parameters in the order of the chain.
 pub type Formula<T> = Arc<dyn Fn(&[f64]) -> T + Send + Sync>;
 
-/// How a quantity follows from the parameters.
+/// The derivation of a quantity from the parameters.
 #[derive(Clone)]
 pub enum Rule {
     /// A number.
     Value(Formula<f64>),
     /// A number that is 0 where the named parameter is, and has an upper limit where that has one.
     Amplitude(String, Formula<f64>),
-    /// An event that comes back: one of its times, and the period.
+    /// A recurring event: one of its times, and the period.
     Event {
-        /// The time t0 near which it is wanted.
+        /// The requested time t0 near it.
         near: f64,
         /// Time and period.
         time_and_period: Formula<[f64; 2]>,
@@ -36,18 +36,18 @@ pub enum Rule {
 pub struct Derived {
     /// Its name.
     pub name: String,
-    /// What it is, in a line, where the name does not say it.
+    /// Its description in one line, where the name is not enough.
     pub definition: Option<String>,
     /// How it is computed.
     pub rule: Rule,
 }
 
-/// The same with what a chain says of it.
+/// The same with its summary by a chain.
 #[derive(Clone)]
 pub struct Settled {
     /// The quantity.
     pub quantity: Derived,
-    /// What the chain says.
+    /// Its summary.
     pub summary: ParameterSummary,
     /// Of an event: phase from t0, around which it is unwrapped.
     centre: f64,
@@ -88,7 +88,7 @@ impl Settled {
         }
     }
 
-    /// The value at a draw, an event's in the turn of the summary.
+    /// The value at a draw; for an event in the cycle of the summary.
     pub fn value(&self, theta: &[f64]) -> f64 {
         match &self.quantity.rule {
             Rule::Value(formula) | Rule::Amplitude(_, formula) => formula(theta),
@@ -157,7 +157,7 @@ fn event(phases: Series, periods: &Series, near: f64) -> (f64, ParameterSummary)
 mod tests {
     use super::*;
 
-    /// One ensemble of one walker a value, so that order does not matter.
+    /// One ensemble with one walker per value, so that order does not matter.
     fn series(values: &[f64]) -> Series {
         vec![vec![values.to_vec()]]
     }
@@ -167,7 +167,7 @@ mod tests {
         (0..count).map(|k| centre + half * (2.0 * (k as f64 + 0.5) / count as f64 - 1.0)).collect()
     }
 
-    /// Times cluster where they are, whatever turn each draw was in, on the side of t0 that is nearer.
+    /// Times cluster at their place, whatever the cycle of each draw, on the nearer side of t0.
     #[test]
     fn an_event_is_taken_in_the_turn_next_to_the_middle() {
         for (phase, time) in [(0.3, 103.0), (7.3, 103.0), (-2.7, 103.0), (0.48, 104.8), (0.53, 95.3), (-0.4, 96.0)] {
@@ -181,7 +181,7 @@ mod tests {
         }
     }
 
-    /// A period of which hardly anything is known does not spread the times more than their phases do.
+    /// A poorly constrained period does not spread the times more than their phases do.
     #[test]
     fn an_uncertain_period_and_an_unknown_phase() {
         let periods: Vec<f64> = (0..4001).map(|k| 2.0 + 16.0 * ((k * 7919) % 4001) as f64 / 4001.0).collect();

@@ -1,8 +1,8 @@
-//! Chains: what was sampled, how far it can be trusted, and what it says.
+//! Chains: samples, their convergence, and their summary.
 //!
-//! [`Record`] is one line, [`Chain`] holds whole steps; `autocorrelation` and `convergence` say how many independent
-//! draws that amounts to, `summary` and `table` say what came out, `derived` of what follows from the parameters too.
-//! All of it is a function of the chain's content alone.
+//! [`Record`] is one line, [`Chain`] holds whole steps; `autocorrelation` and `convergence` give the effective sample
+//! size, `summary` and `table` the results, `derived` those for derived quantities. All are functions of the chain's
+//! content only.
 
 pub mod advice;
 pub mod autocorrelation;
@@ -25,21 +25,21 @@ pub use store::{Chain, Series};
 pub use summary::{Summary, summarise};
 pub use table::table;
 
-/// What can be wrong with a chain.
+/// Errors of a chain.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChainError {
-    /// A line is not the one that comes next.
+    /// A line is not the next one.
     #[error(
         "expected step {}, ensemble {}, walker {} but found step {}, ensemble {}, walker {}",
         expected[0], expected[1], expected[2], found[0], found[1], found[2]
     )]
     Order {
-        /// Step, ensemble and walker that come next.
+        /// Step, ensemble and walker expected.
         expected: [usize; 3],
         /// Step, ensemble and walker found.
         found: [usize; 3],
     },
-    /// A record has the wrong number of parameters, or of numbers beside the log-probability.
+    /// A record has the wrong number of parameters, or of other values.
     #[error("expected {expected} values but found {found}")]
     Dimension {
         /// As many as there are names.
@@ -67,7 +67,7 @@ pub enum ChainError {
         /// Number found.
         found: usize,
     },
-    /// There is nothing to summarise.
+    /// The chain is empty.
     #[error("the chain has no complete step")]
     Empty,
     /// A parameter kind is needed for every parameter.

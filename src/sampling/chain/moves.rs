@@ -1,25 +1,24 @@
-//! How efficient each kind of move is: how often it is accepted, and how many effective samples a reconstruction of it
-//! brings.
+//! Efficiency of each kind of move: acceptance, and effective samples per reconstruction.
 //!
-//! Of a mix, only the correlation over the one step that a move made can be told apart. Moves are judged as if the
-//! chain were of the first order (AR(1)) with that correlation: `rho = 1 - <jump^2> / (2 variance)`, and `(1 - rho) /
-//! (1 + rho)` effective samples a step, for the parameter where that is least.
+//! In a mix, only the correlation over the single step of a move can be attributed to it. Moves are assessed as if the
+//! chain were AR(1) with that correlation: `rho = 1 - <jump^2> / (2 variance)`, and `(1 - rho) / (1 + rho)` effective
+//! samples per step, for the parameter where that is least.
 
 use crate::sampling::chain::{Chain, MoveKind, ParameterKind, Record};
 use crate::sampling::log_density::Status;
 use serde::{Deserialize, Serialize};
 
-/// One kind of move in the steps kept.
+/// One kind of move in the kept steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MoveSummary {
-    /// Which.
+    /// The kind.
     #[serde(rename = "move")]
     pub kind: MoveKind,
     /// Proposals made.
     pub proposals: usize,
-    /// Accepted share of them.
+    /// Accepted fraction of them.
     pub acceptance_fraction: f64,
-    /// Effective samples a reconstruction, as if all moves were of this kind; null where nothing varies.
+    /// Effective samples per reconstruction, as if all moves were of this kind; null where nothing varies.
     pub ess_per_evaluation: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! The summary of one parameter, or of a quantity that follows from them: point estimates, intervals and trust in them.
+//! The summary of one parameter, or of a derived quantity: point estimates, intervals and their convergence.
 //!
 //! - `ci68`, `ci95`: equal tails (16 to 84 %, 2.5 to 97.5 %); `hdi68`, `hdi95`: the shortest intervals.
 //! - A periodic parameter is unwrapped around its mode (cut opposite to it) before anything is computed. Point
@@ -17,7 +17,7 @@ fn is_false(flag: &bool) -> bool {
     !flag
 }
 
-/// Share of a standard deviation within which an amplitude touches zero.
+/// Fraction of a standard deviation within which an amplitude touches zero.
 const TOUCH: f64 = 0.1;
 
 /// Summary of one parameter.
@@ -45,13 +45,13 @@ pub struct ParameterSummary {
     pub ess: Option<f64>,
     /// Integrated autocorrelation time (steps); null where the chain is too short.
     pub tau: Option<f64>,
-    /// Whether the data hardly say more of it than its prior, so that its median means nothing.
+    /// Whether the posterior is close to the prior, so that the median is meaningless.
     #[serde(default, skip_serializing_if = "is_false")]
     pub unconstrained: bool,
-    /// What its standard deviation and intervals were multiplied by, where those of the draws are too small.
+    /// Factor on its standard deviation and intervals, where those of the draws are too small.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub widened: Option<f64>,
-    /// Upper limit (95 %), for an amplitude that touches zero.
+    /// Upper limit (95 %), for an amplitude whose posterior touches zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upper95: Option<f64>,
 }

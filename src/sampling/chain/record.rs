@@ -1,6 +1,6 @@
-//! One line of a chain: where a walker of an ensemble stands at a step, and what became of the proposal made for it.
+//! One line of a chain: the position of a walker of an ensemble at a step, and the result of its proposal.
 //!
-//! The sampler makes these, the journal writes them and the store keeps them; this file belongs to none of the three.
+//! The sampler makes these, the journal writes them and the store keeps them; this file is independent of all three.
 
 use crate::sampling::chain::ChainError;
 use crate::sampling::log_density::{LogDensity, Status};
@@ -35,11 +35,11 @@ impl MoveKind {
 /// A walker at a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// Which of the independent ensembles, from 0.
+    /// Index of the independent ensemble, from 0.
     pub ensemble: usize,
     /// The step; step 0 is the start.
     pub step: usize,
-    /// Which walker of the ensemble, from 0.
+    /// Index of the walker in the ensemble, from 0.
     pub walker: usize,
     /// Whether the position is new at this step (true for every walker of step 0).
     pub accepted: bool,
@@ -47,25 +47,25 @@ pub struct Record {
     pub log_prob: f64,
     /// The position, in physical coordinates, in the order of the names.
     pub theta: Vec<f64>,
-    /// Numbers beside the log-probability, in the order of their names.
+    /// Other values of the evaluation, in the order of their names.
     pub numbers: Vec<f64>,
     /// How the evaluation of the position ended.
     pub status: Status,
     /// How the evaluation of this step's proposal ended, accepted or not.
     pub proposed: Status,
-    /// Applications of the model that the evaluation of this step's proposal took.
+    /// Applications of the model in the evaluation of this step's proposal.
     pub model_applications: u32,
     /// How this step's proposal was made; `None` at step 0.
     pub by: Option<MoveKind>,
 }
 
-/// What every step of a chain looks like: names of the parameters and of the numbers beside the log-probability, number
-/// of ensembles, walkers of each.
+/// The shape of every step of a chain: names of the parameters and of the other values, number of ensembles, walkers of
+/// each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Names of the parameters, in the order of every vector.
     pub names: Vec<String>,
-    /// Names of the numbers beside the log-probability.
+    /// Names of the other values.
     pub numbers: Vec<String>,
     /// Number of independent ensembles.
     pub ensembles: usize,
@@ -74,7 +74,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of a chain of `density`.
+    /// The shape of a chain of `density`.
     pub fn of(density: &dyn LogDensity, ensembles: usize, walkers: usize) -> Self {
         let numbers = density.number_names().iter().map(|name| (*name).to_owned()).collect();
         Shape { names: density.names().to_vec(), numbers, ensembles, walkers }
@@ -85,13 +85,13 @@ impl Shape {
         self.ensembles * self.walkers
     }
 
-    /// Parameters and numbers of a record, by name.
+    /// Parameters and other values of a record, by name.
     fn named<'a>(&'a self, record: &'a Record) -> impl Iterator<Item = (&'a str, &'a f64)> {
         let values = record.theta.iter().chain(&record.numbers);
         self.names.iter().chain(&self.numbers).map(String::as_str).zip(values)
     }
 
-    /// Checks that `record` is line `index` of a chain (counted from 0; order: step, ensemble, walker) and whole.
+    /// Checks that `record` is line `index` of a chain (counted from 0; order: step, ensemble, walker) and complete.
     ///
     /// # Errors
     /// [`ChainError::Order`], [`ChainError::Dimension`] or [`ChainError::NotFinite`].

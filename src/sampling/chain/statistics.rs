@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// Bins of the histogram under the mode.
 const BINS: usize = 1024;
 
-/// The shortest interval that holds a share of the sorted values.
+/// The shortest interval that contains a fraction of the sorted values.
 pub fn shortest_interval(sorted: &[f64], share: f64) -> [f64; 2] {
     let width = ((share * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1;
     let first = (0..sorted.len() - width)
@@ -57,7 +57,7 @@ pub fn periodic_mode(values: &[f64], effective: f64) -> f64 {
     wrap((peak(&smoothed(&around, silverman(spread, effective) * BINS as f64), true) + 0.5) / BINS as f64)
 }
 
-/// Brings periodic values within half a period of `centre`: cut opposite to it.
+/// Brings periodic values within half a period of `centre`: cut opposite it.
 pub fn unwrap_around(values: &mut [f64], centre: f64) {
     values.iter_mut().for_each(|x| *x = centre - 0.5 + wrap(*x - centre + 0.5));
 }

@@ -20,7 +20,7 @@ impl Chain {
     /// A chain without steps.
     ///
     /// # Panics
-    /// If the shape has no ensemble or no walker (a programmer's mistake: settings are validated before).
+    /// If the shape has no ensemble or no walker (a programming error: settings are validated before).
     #[doc(hidden)]
     pub fn new(shape: Shape) -> Self {
         assert!(shape.size() > 0, "a chain needs at least one ensemble and one walker");
@@ -38,7 +38,7 @@ impl Chain {
         &self.shape.names
     }
 
-    /// Number of steps held, the start (step 0) among them.
+    /// Number of steps held, including the start (step 0).
     pub fn steps(&self) -> usize {
         self.records.len() / self.shape.size()
     }
@@ -46,7 +46,7 @@ impl Chain {
     /// Adds the next step.
     ///
     /// # Errors
-    /// [`ChainError`] when the records are not exactly the next step in order, and whole; nothing is added then.
+    /// [`ChainError`] when the records are not exactly the next step in order, and complete; nothing is added then.
     #[doc(hidden)]
     pub fn push_step(&mut self, step: &[Record]) -> Result<(), ChainError> {
         if step.len() != self.shape.size() {
@@ -98,7 +98,7 @@ impl Chain {
         self.records.iter().reduce(|best, record| if record.log_prob > best.log_prob { record } else { best })
     }
 
-    /// Number of evaluations: proposals that were inside the prior, the start among them.
+    /// Number of evaluations: proposals that were inside the prior, including the start.
     pub fn evaluations(&self) -> usize {
         self.records.iter().filter(|record| record.proposed != Status::OutsidePrior).count()
     }

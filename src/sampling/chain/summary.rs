@@ -1,9 +1,9 @@
-//! The summary of a chain: each parameter (`parameter`), costs and failures of the whole.
+//! The summary of a chain: each parameter (`parameter`), costs and failures of the chain.
 //!
 //! Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`,
 //! `model_applications_median` and `best` are of the whole chain, the start included.
 //!
-//! Which parameters are constrained is not the chain's to know: whoever knows the priors fills it in.
+//! The chain does not know which parameters are constrained: a caller that knows the priors fills it in.
 
 use crate::numerics::quantile::quantile;
 use crate::sampling::chain::autocorrelation::mean;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The place of the highest log-probability.
+/// The position of the highest log-probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Best {
     /// Its log-probability.
@@ -32,22 +32,21 @@ pub struct Summary {
     pub names: Vec<String>,
     /// Summary of each parameter, by name.
     pub parameters: BTreeMap<String, ParameterSummary>,
-    /// Names of the quantities that follow from the parameters, in order.
+    /// Names of the derived quantities, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub derived_names: Vec<String>,
     /// Summary of each of them, by name, from its values at the draws.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derived: BTreeMap<String, ParameterSummary>,
-    /// What names of parameters and derived quantities mean, where they do not say it.
+    /// Descriptions of parameters and derived quantities, where their names are not enough.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub definitions: BTreeMap<String, String>,
-    /// Accepted share of the proposals, of the steps kept.
+    /// Acceptance fraction over the kept steps.
     pub acceptance_fraction: f64,
-    /// How efficient each kind of move is; empty for a chain that does not name its moves.
+    /// Efficiency of each kind of move; empty for a chain that does not name its moves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<MoveSummary>,
-    /// Effective samples per evaluation, of the steps kept: that of the parameter where it is least; null where
-    /// unknown.
+    /// Effective samples per evaluation over the kept steps, for the parameter where it is least; null where unknown.
     #[serde(default)]
     pub ess_per_evaluation: Option<f64>,
     /// Whether every parameter has reached the goals and no walker is stuck.
@@ -58,18 +57,18 @@ pub struct Summary {
     pub discarded_steps: usize,
     /// Number of evaluations, the start included.
     pub evaluations: usize,
-    /// How many of them failed.
+    /// Number of failed ones.
     pub failures: usize,
-    /// Median number of model applications that an evaluation took.
+    /// Median number of model applications per evaluation.
     #[serde(alias = "passes_median")]
     pub model_applications_median: f64,
-    /// The place of the highest log-probability.
+    /// The position of the highest log-probability.
     pub best: Best,
-    /// What to do, where the chain has not converged or something looks wrong.
+    /// Advice, where the chain has not converged or something looks wrong.
     pub advice: Vec<String>,
 }
 
-/// Summarises a chain; `kinds` has one entry a parameter.
+/// Summarises a chain; `kinds` has one entry per parameter.
 ///
 /// # Errors
 /// [`ChainError::Empty`] or [`ChainError::Kinds`].
@@ -118,7 +117,7 @@ impl std::fmt::Display for Summary {
 }
 
 impl Summary {
-    /// Adds what `chain`, of which it is the summary, says of quantities that follow from the parameters.
+    /// Adds the summaries of derived quantities from `chain`, the chain of this summary.
     pub fn derive(&mut self, chain: &Chain, quantities: Vec<Derived>) -> Vec<Settled> {
         let has_limit = |name: &str| self.parameters.get(name).is_some_and(|one| one.upper95.is_some());
         let settled = derived::settle(chain, self.discarded_steps, quantities, &has_limit);
@@ -131,7 +130,7 @@ impl Summary {
     }
 }
 
-/// That of the evaluations; 0 when there are none.
+/// The median over the evaluations; 0 when there are none.
 fn model_applications_median(chain: &Chain) -> f64 {
     let evaluated = chain.records().iter().filter(|record| record.proposed != Status::OutsidePrior);
     let mut counts: Vec<f64> = evaluated.map(|record| f64::from(record.model_applications)).collect();

@@ -1,4 +1,4 @@
-//! The summary as text, aligned, one line a parameter, and a last line that says plainly whether it can be trusted.
+//! The summary as text, aligned, one line per parameter, and a last line on convergence.
 
 use crate::numerics::text::aligned;
 use crate::sampling::chain::{MoveSummary, ParameterSummary, Summary};
@@ -35,7 +35,7 @@ pub fn parameters(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> S
     text
 }
 
-/// What follows the parameters: limits, what is derived from them, and how the chain went.
+/// The part after the parameters: limits, derived quantities, and statistics of the chain.
 pub fn rest(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
     let mut text = String::new();
     for name in &summary.names {
@@ -58,7 +58,7 @@ pub fn rest(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String 
     text + &moves(summary) + &convergence(summary) + "\n"
 }
 
-/// What follows from the parameters, and what names mean; `truth` has it too.
+/// Derived quantities and descriptions of names; `truth` contains them as well.
 fn derived(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
     let mut head = vec!["derived", "median", "- 68%", "+ 68%", "95% interval", "95% HDI"];
     if truth.is_some() {
@@ -115,8 +115,7 @@ fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
         |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
     let median = if one.unconstrained { "-".to_owned() } else { number(one.median, digits) };
     let side = |width: f64| if one.unconstrained { "-".to_owned() } else { number(width, digits) };
-    // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped
-    // estimate.
+    // Differences from the median of the interval: a periodic one may be in another cycle than a wrapped estimate.
     vec![
         name.to_owned(),
         median,

@@ -1,5 +1,5 @@
-//! The affine-invariant ensemble: `sampler` makes a step by one of the `moves`, from where `start` puts the walkers;
-//! `stop` has the loop of steps.
+//! The affine-invariant ensemble: `sampler` makes a step by one of the `moves`, from the positions of `start`; `stop`
+//! has the loop of steps.
 //!
 //! Source: Goodman & Weare 2010 (stretch move), ter Braak 2006 (differential evolution), Foreman-Mackey et al. 2013
 //! (halves in turn, so that walkers can be evaluated in parallel). Several independent ensembles run side by side.
@@ -19,7 +19,7 @@ pub use stop::{OnStep, RunError, StopPolicy, StopReason, run, sample};
 
 use crate::sampling::log_density::Status;
 
-/// What can be wrong with the settings or the start of an ensemble.
+/// Errors of the settings or the start of an ensemble.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EnsembleError {
     /// A setting has an impossible value.
@@ -27,20 +27,20 @@ pub enum EnsembleError {
     Setting {
         /// The key in the config.
         key: &'static str,
-        /// What is wrong, with the value found.
+        /// The error, with the value found.
         problem: String,
     },
-    /// The start (or the chain to go on from) does not have the ensembles, walkers or parameters of the settings.
+    /// The start (or the chain to resume) does not have the ensembles, walkers or parameters of the settings.
     #[error("{what}: {expected} expected, {found} found")]
     Shape {
-        /// What was counted.
+        /// The counted item.
         what: String,
-        /// The number the settings ask for.
+        /// The number required by the settings.
         expected: usize,
         /// The number found.
         found: usize,
     },
-    /// The chain to go on from is of other parameters.
+    /// The chain to resume has other parameters.
     #[error("the chain holds the parameters {found:?}, but {expected:?} are sampled")]
     Names {
         /// Names of the density.
@@ -48,7 +48,7 @@ pub enum EnsembleError {
         /// Names in the chain.
         found: Vec<String>,
     },
-    /// The chain to go on from holds other numbers beside each log-probability.
+    /// The chain to resume has other values in its records.
     #[error("the chain holds {found:?} beside each log-probability, but the density gives {expected:?}")]
     Numbers {
         /// Names of the density's.
@@ -59,7 +59,7 @@ pub enum EnsembleError {
     /// The evaluator stopped before the start was evaluated.
     #[error("stopped before the first step")]
     Stopped,
-    /// The chain to go on from has no complete step.
+    /// The chain to resume has no complete step.
     #[error("the chain has no complete step to go on from")]
     NothingToResume,
     /// A coordinate of a start position is not finite.
@@ -74,7 +74,7 @@ pub enum EnsembleError {
         /// Its value.
         value: f64,
     },
-    /// All walkers of an ensemble start at one value of a parameter, which no move could ever change.
+    /// All walkers of an ensemble start at one value of a parameter, which no move can change.
     #[error("start of ensemble {ensemble}: all walkers have the same `{name}`; no move could ever change it")]
     StartNoSpread {
         /// The ensemble.
@@ -104,7 +104,7 @@ pub enum EnsembleError {
         /// `name = value` of every parameter.
         position: String,
     },
-    /// The covariance to draw a start from is not a covariance of the parameters.
+    /// The covariance for drawing a start is not a covariance of the parameters.
     #[error("the covariance of the start is not a positive definite {dimension} x {dimension} matrix")]
     StartCovariance {
         /// Number of parameters.

@@ -1,9 +1,8 @@
 //! The sampler: independent ensembles, moved half by half, every half of all of them evaluated as one batch.
 //!
 //! Source: Goodman & Weare 2010 (ensemble), Foreman-Mackey et al. 2013, section 2 (halves in turn). The split into
-//! halves is drawn anew each step. Positions are kept in *written* coordinates and a proposal is written -> internal ->
-//! move -> written, so a chain read back from a file goes on to the same bytes. Random numbers are counter-based
-//! (`streams`).
+//! halves is drawn again at each step. Positions are kept in *written* coordinates and a proposal is written ->
+//! internal -> move -> written, so a resumed chain is bit-identical. Random numbers are counter-based (`streams`).
 
 use crate::sampling::chain::{Chain, MoveKind, Record};
 use crate::sampling::ensemble::streams::{Purpose, random_numbers, stream};
@@ -13,12 +12,12 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// One walker: where it stands.
+/// One walker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Walker {
     /// Position in physical coordinates.
     pub theta: Vec<f64>,
-    /// Its evaluation (`model_applications` are not kept through a resume and play no role).
+    /// Its evaluation (`model_applications` are lost on resuming and not used).
     pub evaluation: Evaluation,
 }
 
@@ -41,7 +40,7 @@ pub struct Sampler<'a> {
     mix: Mix,
 }
 
-/// A proposal on its way through a half-step.
+/// A proposal within a half-step.
 struct Trial {
     ensemble: usize,
     walker: usize,
@@ -53,7 +52,7 @@ struct Trial {
     refused: Option<Status>,
 }
 
-/// What became of a walker in a step.
+/// The result of a step for a walker.
 #[derive(Clone, Copy)]
 struct Outcome {
     accepted: bool,
@@ -63,7 +62,7 @@ struct Outcome {
 }
 
 impl<'a> Sampler<'a> {
-    /// A sampler of `density`, whose batches go through `evaluator`.
+    /// A sampler of `density`, whose batches are evaluated by `evaluator`.
     ///
     /// # Errors
     /// [`EnsembleError::Setting`] when the settings are impossible for this density.
@@ -126,7 +125,7 @@ impl<'a> Sampler<'a> {
         Ok((state, records))
     }
 
-    /// The state at the last step of a chain, to go on from.
+    /// The state at the last step of a chain, to resume.
     ///
     /// # Errors
     /// [`EnsembleError`] when the chain has no step, or not the ensembles, walkers and parameters of this sampler.
@@ -154,7 +153,7 @@ impl<'a> Sampler<'a> {
         Ok(State { step: chain.steps() - 1, ensembles })
     }
 
-    /// Moves every walker once. `None`, with the state as it was, when `stop` was set before the last half was begun,
+    /// Moves every walker once. `None`, with the state unchanged, when `stop` was set before the last half was begun,
     /// or the evaluator stopped within a half.
     pub fn step(&self, state: &mut State, stop: &AtomicBool) -> Option<Vec<Record>> {
         let step = state.step + 1;
@@ -197,7 +196,7 @@ impl<'a> Sampler<'a> {
                 let proposal = self.mix.propose(&here, &complement, &mut rng);
                 let theta = self.density.to_physical(&proposal.position);
                 let refused = match proposal.position == here {
-                    // nothing new to look at
+                    // no new evaluation needed
                     true => Some(Status::OutsidePrior),
                     false => self.refuse(&proposal.position, &theta, proposal.translation),
                 };
@@ -209,7 +208,7 @@ impl<'a> Sampler<'a> {
         trials
     }
 
-    /// Why a proposal need not be evaluated: it is no number, or it lies beyond the wrap of a periodic coordinate.
+    /// Why a proposal need not be evaluated: it is not finite, or lies beyond the wrap of a periodic coordinate.
     fn refuse(&self, position: &[f64], theta: &[f64], translation: bool) -> Option<Status> {
         if position.iter().chain(theta).any(|x| !x.is_finite()) {
             return Some(Status::NonFinite);
@@ -231,7 +230,7 @@ impl<'a> Sampler<'a> {
         let current = &mut state.ensembles[trial.ensemble][trial.walker];
         let candidate = Walker { theta: trial.theta, evaluation };
         let log_ratio = self.target(&candidate) - self.target(current) + trial.log_factor;
-        // A ratio that is no number, or a target of plus infinity (a Jacobian's pole), is never accepted.
+        // A NaN ratio, or a target of plus infinity (a Jacobian's pole), is never accepted.
         let accepted = self.target(&candidate).is_finite() && trial.log_uniform < log_ratio;
         if accepted {
             *current = candidate;
@@ -247,8 +246,8 @@ impl<'a> Sampler<'a> {
         walker.evaluation.log_prob + self.density.log_jacobian(&walker.theta)
     }
 
-    /// Evaluates a batch; `None` if it was not evaluated to its end. Whatever is not a usable number is turned into a
-    /// rejection here, where it enters the sampler.
+    /// Evaluates a batch; `None` if the evaluation was stopped. Unusable numbers become rejections here, where they
+    /// enter the sampler.
     fn evaluate(&self, batch: Vec<Vec<f64>>) -> Option<Vec<Evaluation>> {
         let mut evaluations = if batch.is_empty() { Vec::new() } else { self.evaluator.evaluate(&batch) };
         assert!(evaluations.len() <= batch.len(), "an evaluator answers no more than it is asked");
@@ -278,7 +277,7 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// The records of a state, given what became of each walker (`ensemble * walkers + walker`).
+/// The records of a state, given the result for each walker (`ensemble * walkers + walker`).
 fn records(state: &State, outcomes: &[Outcome]) -> Vec<Record> {
     let walkers = state.ensembles.iter().enumerate();
     let indexed = walkers.flat_map(|(e, ensemble)| ensemble.iter().enumerate().map(move |(w, walker)| (e, w, walker)));

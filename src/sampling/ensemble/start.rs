@@ -1,4 +1,4 @@
-//! Starts: an over-dispersed draw around a centre, and the checks that any start must pass.
+//! Starts: an over-dispersed draw around a centre, and the checks of any start.
 //!
 //! A start in a plane stays there under affine-invariant moves (Goodman & Weare 2010, section 2), hence the checks.
 //! R-hat asks for starts wider than the posterior (Gelman & Rubin 1992), hence the scale.
@@ -17,7 +17,7 @@ const TRIES: usize = 2000;
 /// Positions of walkers in physical coordinates, `[ensemble][walker][parameter]`.
 pub type Positions = Vec<Vec<Vec<f64>>>;
 
-/// What a start is drawn from.
+/// The distribution of a start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartDraw<'a> {
     /// The centre, in physical coordinates.
@@ -97,7 +97,7 @@ pub(super) fn check_shape(positions: &[Vec<Vec<f64>>], shape: [usize; 3]) -> Res
     Ok(())
 }
 
-/// Checks that the positions are finite and that the walkers of each ensemble span the internal space.
+/// Checks that the positions are finite and that the walkers of each ensemble span the sampling coordinates.
 pub(super) fn check_spread(density: &dyn LogDensity, positions: &[Vec<Vec<f64>>]) -> Result<(), EnsembleError> {
     let names = density.names();
     for (ensemble, walkers) in positions.iter().enumerate() {
@@ -115,8 +115,8 @@ pub(super) fn check_spread(density: &dyn LogDensity, positions: &[Vec<Vec<f64>>]
     Ok(())
 }
 
-/// Gram-Schmidt over the columns (one a coordinate, each scaled by its own spread): the first that the ones before it
-/// explain is named.
+/// Gram-Schmidt over the columns (one per coordinate, each scaled by its spread): the first that depends on those
+/// before it is named.
 fn check_columns(names: &[String], ensemble: usize, columns: Vec<Vec<f64>>) -> Result<(), EnsembleError> {
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for (i, column) in columns.into_iter().enumerate() {
@@ -127,7 +127,7 @@ fn check_columns(names: &[String], ensemble: usize, columns: Vec<Vec<f64>>) -> R
             return Err(EnsembleError::StartNoSpread { ensemble, name: names[i].clone() });
         }
         let mut rest = centred.normalize();
-        // Twice, so that rounding of the first pass does not pass for independence.
+        // Twice, so that rounding errors of the first pass do not look like independence.
         for _ in 0..2 {
             for unit in &basis {
                 let along = unit.dot(&rest);

@@ -1,7 +1,7 @@
-//! The loop of steps, and when it ends: goals reached, step limit, or asked to.
+//! The loop of steps, and when it ends: goals reached, step limit, or a request.
 //!
-//! The goals are looked at every so many steps and depend on the chain's content alone, so a chain that was interrupted
-//! and resumed ends at the same step as one that was not.
+//! The goals are checked at fixed intervals and depend only on the chain's content, so an interrupted and resumed chain
+//! ends at the same step as an uninterrupted one.
 
 use crate::sampling::chain::{Chain, ChainError, Convergence, Goals, ParameterKind, Record, Shape, Summary, summarise};
 use crate::sampling::ensemble::{EnsembleError, Sampler, SamplerSettings, State};
@@ -9,26 +9,26 @@ use crate::sampling::log_density::{LogDensity, Threads};
 use std::convert::Infallible;
 use std::sync::atomic::AtomicBool;
 
-/// When to end.
+/// Stopping criteria.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StopPolicy {
     /// Step limit: the number of the last step.
     pub steps: usize,
-    /// What every parameter must reach.
+    /// Goals for every parameter.
     pub goals: Goals,
-    /// The goals are looked at when the step is a multiple of this; before twice as many steps, of a fifth of it.
+    /// The goals are checked at multiples of this step; before twice as many steps, at multiples of a fifth of it.
     pub every: usize,
-    /// Steps to make in any case: the goals end no chain before this step (for `--extend`).
+    /// Minimum number of steps: the goals end no chain before this step (for `--extend`).
     pub least: usize,
 }
 
-/// A chain ends early only if what is kept of it is so many autocorrelation times long.
+/// A chain ends early only if its kept steps are this many autocorrelation times long.
 const EARLY_TIMES: f64 = 10.0;
 
-/// No chain ends before this step: with fewer, walkers that are stuck look like others.
+/// No chain ends before this step: with fewer, stuck walkers look like others.
 const EARLIEST: usize = 20;
 
-/// What is done with each step: the records, and the diagnostics when they were due.
+/// The callback for each step: the records, and the diagnostics when due.
 pub type OnStep<'a, E> = dyn FnMut(&[Record], Option<&Convergence>) -> Result<(), E> + 'a;
 
 /// Why a chain ended.
@@ -38,11 +38,11 @@ pub enum StopReason {
     Converged,
     /// The step limit is reached and the goals are not.
     StepLimit,
-    /// It was asked to stop; the chain can be resumed.
+    /// A stop was requested; the chain can be resumed.
     Interrupted,
 }
 
-/// What can go wrong in [`run`].
+/// Errors of [`run`].
 #[derive(Debug, thiserror::Error)]
 pub enum RunError<E> {
     /// The sampler refused.
@@ -57,13 +57,13 @@ pub enum RunError<E> {
 }
 
 impl StopPolicy {
-    /// The policy of the settings, looking at the goals every 50 steps, and every 10 steps from step 20 to 100.
+    /// The policy of the settings, checking the goals every 50 steps, and every 10 steps from step 20 to 100.
     pub fn new(settings: &SamplerSettings) -> Self {
         let goals = Goals { rhat: settings.rhat, ess: settings.ess };
         StopPolicy { steps: settings.steps, goals, every: 50, least: 0 }
     }
 
-    /// Whether the chain ends where it is now, with the diagnostics if they were made.
+    /// Whether the chain ends at its present step, with the diagnostics if computed.
     ///
     /// # Errors
     /// [`ChainError::Kinds`] when `kinds` does not match the chain.
@@ -94,8 +94,8 @@ impl StopPolicy {
 
 /// Steps from the end of `chain` until the policy or `stop` says so.
 ///
-/// `chain` holds step 0 at least ([`Sampler::start`]) or whatever was read back. Each step is handed to `on_step`
-/// (which writes it, and shows progress) together with the diagnostics when they were due, before the next one begins.
+/// `chain` contains at least step 0 ([`Sampler::start`]) or the steps read from a file. Each step is passed to
+/// `on_step` (which writes it, and shows progress) together with the diagnostics when due, before the next one begins.
 ///
 /// # Errors
 /// [`RunError`]: a chain that does not fit the sampler, or a callback that failed.
@@ -123,11 +123,11 @@ pub fn run<E>(
 }
 
 /// A chain of `density` in memory, on all threads, and its summary: from `start`, positions
-/// `[ensemble][walker][parameter]`, until the goals or the step limit of `settings`. The surrogate among its moves has
-/// no part in it. The same seed gives the same chain, whatever the number of threads.
+/// `[ensemble][walker][parameter]`, until the goals or the step limit of `settings`. The surrogate move is not used.
+/// The same seed gives the same chain, whatever the number of threads.
 ///
 /// # Errors
-/// [`EnsembleError`]: settings that are impossible for this density, or a start that is none.
+/// [`EnsembleError`]: settings that are impossible for this density, or an invalid start.
 pub fn sample(
     density: &dyn LogDensity,
     settings: &SamplerSettings,
@@ -153,5 +153,5 @@ pub fn sample(
     }
 }
 
-/// Why a chain takes what the sampler hands to it.
+/// Why a chain accepts the output of the sampler.
 const OURS: &str = "records are the sampler's own";

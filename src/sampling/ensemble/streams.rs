@@ -1,10 +1,10 @@
-//! Random numbers by counter: the stream is that of a purpose, ensemble and walker, the position in it that of the
-//! step; there is no generator state to keep.
+//! Random numbers by counter: the stream is given by purpose, ensemble and walker, the position in it by the step; no
+//! generator state is stored.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What random numbers are for; no two purposes share a stream.
+/// The purpose of random numbers; no two purposes share a stream.
 #[derive(Clone, Copy)]
 pub(super) enum Purpose {
     Walker = 0,
@@ -17,7 +17,7 @@ pub(super) fn stream(purpose: Purpose, ensemble: usize, walker: usize) -> u64 {
     (purpose as u64) << 60 | (ensemble as u64) << 30 | walker as u64
 }
 
-/// The random numbers of a stream at a step: 2^16 words are set aside for each.
+/// The random numbers of a stream at a step: 2^16 words are reserved for each.
 pub(super) fn random_numbers(seed: u64, stream: u64, step: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);

@@ -1,14 +1,14 @@
-//! Where the nodes of a landscape are: axes of equally spaced values, and the order of their products.
+//! The nodes of a likelihood grid: axes of equally spaced values, and the order of their product.
 
 use serde::{Deserialize, Serialize};
 
-/// A period is met to within this: whoever writes 0.1 and 1.1 means a whole one.
+/// Tolerance of a whole period: an axis from 0.1 to 1.1 covers one.
 const PERIOD_ROUNDING: f64 = 1e-9;
 
 /// One axis: `nodes` equally spaced values from `min` to `max`, both included.
 ///
 /// A periodic parameter (period 1) has its values in `[0, 1)`: `min` and `max` may lie outside, so that an axis can
-/// wrap around 0. Where they are a whole period apart they are the same place, and `max` is left out.
+/// wrap around 0. Where they are a whole period apart they are the same point, and `max` is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// Name of the parameter.
@@ -42,7 +42,7 @@ impl Axis {
     /// Value number `k`.
     pub fn value(&self, k: usize) -> f64 {
         let t = k as f64 / self.intervals();
-        // both ends come out as they were given
+        // both ends are reproduced exactly
         let value = self.min * (1.0 - t) + self.max * t;
         // a tiny negative number has remainder 1 after rounding
         if self.periodic { value.rem_euclid(1.0) % 1.0 } else { value }

@@ -1,13 +1,13 @@
-//! The posterior of one parameter from a landscape: exp(ln L) times the prior, integrated over the other axes.
+//! The posterior of one parameter from a likelihood grid: exp(ln L) times the prior, marginalised over the other axes.
 //!
-//! Over the others: the trapezoid, and in cells where the prior is cut off L linear between nodes under the prior as it
-//! is. Along the axis: ln L is a cubic between nodes, exact for a Gaussian however wide the spacing. A circle is cut
-//! opposite to its highest node. A node without a value counts as impossible.
+//! Over the others: the trapezoidal rule, and in cells where the prior is cut off L linear between nodes, times the
+//! exact prior. Along the axis: ln L is a cubic between nodes, exact for a Gaussian whatever the spacing. A periodic
+//! axis is cut opposite its highest node. A node without a value has likelihood 0.
 
 use super::{Axis, Landscape};
 use crate::numerics::logarithms::ln_sum;
 
-/// Steps of the integrals to each cell.
+/// Integration steps per cell.
 const STEPS: usize = 64;
 
 /// The distribution of one parameter along its axis.
@@ -23,8 +23,8 @@ pub struct Marginal {
 }
 
 impl Marginal {
-    /// That of the parameter on axis number `target`; `prior` is the density of the one on axis `i` at `x`. `None`
-    /// where it is nowhere above zero.
+    /// The distribution of the parameter on axis number `target`; `prior` is the density of the one on axis `i` at `x`.
+    /// `None` where it is nowhere above zero.
     pub fn of(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -> f64) -> Option<Self> {
         let axis = landscape.grid().axes.get(target)?;
         let mut log_likelihood = integrated(landscape, target, prior);
@@ -49,7 +49,7 @@ impl Marginal {
         Some(Marginal { first, spacing: axis.spacing(), cumulative, periodic: axis.periodic })
     }
 
-    /// Where the share `p` is reached; a periodic parameter may be outside [0, 1).
+    /// The quantile of `p`; a periodic parameter may be outside [0, 1).
     pub fn quantile(&self, p: f64) -> f64 {
         let after = self.cumulative.partition_point(|c| *c < p).clamp(1, self.cumulative.len() - 1);
         let (low, high) = (self.cumulative[after - 1], self.cumulative[after]);
@@ -70,7 +70,7 @@ impl Marginal {
         (0..=(self.cumulative.len() - 1) / STEPS).map(|k| self.first + k as f64 * self.spacing).collect()
     }
 
-    /// `x` on the axis as it lies here, a periodic one in the turn that it belongs to; `None` outside.
+    /// `x` on this axis, a periodic one in the matching cycle; `None` outside.
     pub fn place(&self, x: f64) -> Option<f64> {
         let length = (self.cumulative.len() - 1) as f64 * self.step();
         let from_first = if self.periodic { (x - self.first).rem_euclid(1.0) } else { x - self.first };
@@ -85,7 +85,7 @@ impl Marginal {
     }
 }
 
-/// ln of L at each value of axis `target`, the other axes integrated over under their priors.
+/// ln of L at each value of axis `target`, marginalised over the other axes under their priors.
 fn integrated(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -> f64) -> Vec<f64> {
     let grid = landscape.grid();
     let weights_of = |(i, axis)| if i == target { Vec::new() } else { weights(axis, &|x| prior(i, x)) };
@@ -100,8 +100,8 @@ fn integrated(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -
     log_terms.iter().map(|terms| ln_sum(terms)).collect()
 }
 
-/// What each node of an axis counts in the integral over it: by the trapezoid, or with L linear between nodes where the
-/// prior is cut off next to it.
+/// Weight of each node of an axis in the integral over it: by the trapezoidal rule, or with L linear between nodes
+/// where the prior is cut off next to it.
 fn weights(axis: &Axis, prior: &dyn Fn(f64) -> f64) -> Vec<f64> {
     let density = |place: f64| prior(wrapped(axis, axis.min + place * axis.spacing()));
     let midpoints = (0..STEPS).map(|step| (step as f64 + 0.5) / STEPS as f64);
@@ -125,7 +125,7 @@ fn wrapped(axis: &Axis, x: f64) -> f64 {
 /// ln L along an axis, between its nodes.
 struct Along<'a> {
     log_likelihood: &'a [f64],
-    /// Which node comes first.
+    /// Index of the first node.
     begin: usize,
     circle: bool,
 }
@@ -135,7 +135,8 @@ impl Along<'_> {
         if self.circle { self.log_likelihood.len() } else { self.log_likelihood.len() - 1 }
     }
 
-    /// At `place`, in nodes from the first: the polynomial through the four nodes around it, or as many as there are.
+    /// At `place`, in nodes from the first: the polynomial through the four nodes around it, or fewer if the axis is
+    /// shorter.
     fn log_likelihood(&self, place: f64) -> f64 {
         let count = self.log_likelihood.len();
         let cell = place.floor() as isize;

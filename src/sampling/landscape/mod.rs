@@ -1,9 +1,8 @@
-//! The landscape: ln L of the reconstructions on a Cartesian grid over one to three parameters (`docs/method.md`
-//! section 6), the paper's own way to an orbit.
+//! The likelihood grid: ln L of the reconstructions on a Cartesian grid over one to three parameters (`docs/method.md`
+//! section 6), the method of Petit et al. (2015) for an orbit.
 //!
-//! [`Grid`] says where the nodes are, [`Landscape`] holds their values in order, `table` says where the highest one is,
-//! `paraboloid` what the nodes around it (`region`) say of the parameters, and `marginal` what all of them do once
-//! there is a prior.
+//! [`Grid`] has the nodes, [`Landscape`] their values in order, `table` the highest one, `paraboloid` the fit to the
+//! nodes around it (`region`), and `marginal` the posterior from all nodes under a prior.
 
 pub mod grid;
 pub mod marginal;

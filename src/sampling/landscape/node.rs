@@ -3,18 +3,18 @@
 use super::grid::Grid;
 use crate::sampling::log_density::{Evaluation, Status};
 
-/// A node with what was found there.
+/// A node with its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// Which node of the grid.
+    /// Index of the node in the grid.
     pub index: usize,
     /// Its coordinates, in the order of the axes.
     pub theta: Vec<f64>,
-    /// ln L there, and numbers beside it.
+    /// ln L there, and other values.
     pub evaluation: Evaluation,
 }
 
-/// A landscape, perhaps not finished: the values at the first nodes of a grid.
+/// A likelihood grid, perhaps unfinished: the values at the first nodes of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landscape {
     grid: Grid,
@@ -22,7 +22,7 @@ pub struct Landscape {
     nodes: Vec<Node>,
 }
 
-/// A node that is not the next one of a landscape.
+/// A node that is not the next one of a likelihood grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LandscapeError {
     /// The grid has no more nodes.
@@ -31,12 +31,12 @@ pub enum LandscapeError {
     /// It is another node.
     #[error("expected node {expected} but found node {found}")]
     Order {
-        /// The node that comes next.
+        /// The next node.
         expected: usize,
         /// The node found.
         found: usize,
     },
-    /// It is in another place.
+    /// Its coordinates differ.
     #[error("node {index} is at {expected:?}, not at {found:?}")]
     Place {
         /// The node.
@@ -57,7 +57,7 @@ pub enum LandscapeError {
 }
 
 impl Landscape {
-    /// A landscape without values, of `numbers` of these names beside ln L.
+    /// A likelihood grid without values, for ln L and `numbers` with these names.
     pub fn new(grid: Grid, numbers: Vec<String>) -> Self {
         Landscape { grid, numbers, nodes: Vec::new() }
     }
@@ -65,7 +65,7 @@ impl Landscape {
     /// Adds the next node.
     ///
     /// # Errors
-    /// [`LandscapeError`] when it is not the next one, or its values are not whole.
+    /// [`LandscapeError`] when it is not the next one, or its values are incomplete.
     pub fn push(&mut self, node: Node) -> Result<(), LandscapeError> {
         let expected = self.nodes.len();
         if expected == self.grid.len() {
@@ -88,17 +88,17 @@ impl Landscape {
         Ok(())
     }
 
-    /// Where the nodes are.
+    /// The grid of nodes.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Names of the numbers beside ln L.
+    /// Names of the values besides ln L.
     pub fn numbers(&self) -> &[String] {
         &self.numbers
     }
 
-    /// The number of that name at a node.
+    /// The value of that name at a node.
     pub fn number(&self, node: &Node, name: &str) -> Option<f64> {
         let place = self.numbers.iter().position(|number| number == name)?;
         node.evaluation.numbers.get(place).copied()
@@ -109,7 +109,7 @@ impl Landscape {
         &self.nodes
     }
 
-    /// Whether every node of the grid is there.
+    /// Whether every node of the grid has been evaluated.
     pub fn is_whole(&self) -> bool {
         self.nodes.len() == self.grid.len()
     }
@@ -124,7 +124,7 @@ impl Landscape {
         self.valued().reduce(|best, node| if node.evaluation.log_prob > best.evaluation.log_prob { node } else { best })
     }
 
-    /// Number of nodes whose evaluation ended like that.
+    /// Number of nodes whose evaluation ended with that status.
     pub fn count(&self, is: impl Fn(Status) -> bool) -> usize {
         self.nodes.iter().filter(|node| is(node.evaluation.status)).count()
     }

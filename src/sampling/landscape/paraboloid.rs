@@ -1,10 +1,10 @@
-//! The paraboloid: the paper's own estimate of the parameters and of their error bars (Petit et al. 2015;
-//! `docs/method.md` section 6).
+//! The paraboloid: the estimate of the parameters and of their error bars by Petit et al. (2015; `docs/method.md`
+//! section 6).
 //!
 //! Least squares of a second-order polynomial to chi2 = -2 ln L at the nodes around the highest one (`region`). Its
 //! vertex is the estimate, the inverse of half its Hessian the covariance, and the projection of the surface one above
-//! the minimum on an axis the error bar: the square root of the diagonal. Where there is no minimum to speak of, it
-//! says so instead.
+//! the minimum on an axis the error bar: the square root of the diagonal. Without a well-defined minimum the reason is
+//! returned instead.
 
 use super::region::{Member, Rule, region};
 use super::{Axis, Grid, Landscape, Node};
@@ -14,17 +14,17 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-/// Nodes to each coefficient, at least.
+/// Fewest nodes per coefficient.
 const LEAST: f64 = 1.5;
 
-/// Nodes to each coefficient that the region grows to where the user says nothing.
+/// Default number of nodes per coefficient to which the region grows.
 const ENOUGH: f64 = 2.0;
 
 /// Smallest singular value of the polynomial's terms at the nodes, relative to the largest: below it they are not
 /// independent.
 const INDEPENDENT: f64 = 1e-6;
 
-/// chi2 is good to 2e-3: what rises by less towards the ends of the region has no curvature.
+/// chi2 is accurate to 2e-3: a surface that rises by less towards the ends of the region has no curvature.
 const FLAT: f64 = 4e-3;
 
 /// The paraboloid around the highest node.
@@ -40,7 +40,7 @@ pub struct Paraboloid {
     pub rms_chi2: f64,
     /// Number of nodes that it was fitted to.
     pub nodes: usize,
-    /// How far above the highest one they reach (chi2).
+    /// Their largest chi2 above that of the highest one.
     pub delta_chi2: f64,
     /// Nodes among them that were left out because the target chi2 was out of reach.
     pub unreachable: usize,
@@ -51,11 +51,11 @@ pub struct Paraboloid {
 /// One parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// Where the vertex is; in [0, 1) if periodic.
+    /// The vertex; in [0, 1) if periodic.
     pub vertex: f64,
-    /// How far the surface of Delta chi2 = 1 reaches.
+    /// Half width of the surface of Delta chi2 = 1.
     pub error: f64,
-    /// Where the nodes are, around the vertex: a periodic parameter may leave [0, 1).
+    /// The range of the nodes around the vertex: a periodic parameter may leave [0, 1).
     pub reach: [f64; 2],
 }
 
@@ -65,7 +65,7 @@ pub enum Undefined {
     /// No node has a value.
     #[error("no well-defined minimum: no reconstruction converged")]
     Nothing,
-    /// Nodes beyond the reach of the target chi2 are higher than all others.
+    /// Nodes that miss the target chi2 are higher than all others.
     #[error("no well-defined minimum: the highest node, {0}, is beyond the reach of the target chi2")]
     Unreachable(usize),
     /// The minimum may be outside.
@@ -74,7 +74,7 @@ pub enum Undefined {
         /// The axes.
         axes: Vec<String>,
     },
-    /// Fewer nodes than it takes.
+    /// Too few nodes.
     #[error("no well-defined minimum: {found} nodes around the highest one, a paraboloid needs {needed}")]
     TooFew {
         /// Nodes in the region.
@@ -82,7 +82,7 @@ pub enum Undefined {
         /// Nodes needed.
         needed: usize,
     },
-    /// The nodes lie so that they leave a coefficient open.
+    /// The positions of the nodes leave a coefficient undetermined.
     #[error(
         "no well-defined minimum: the {found} nodes around the highest one do not determine all terms of a paraboloid"
     )]
@@ -99,17 +99,17 @@ pub enum Undefined {
         /// Whether it curves downwards.
         falls: bool,
     },
-    /// The vertex is where nothing was fitted.
+    /// The vertex is outside of the fitted region.
     #[error("no well-defined minimum: the vertex lies outside the nodes of the fit, at {axis} {vertex:.6}")]
     Outside {
-        /// The axis along which it does.
+        /// The axis along which it is outside.
         axis: String,
-        /// Its place there.
+        /// Its coordinate there.
         vertex: f64,
     },
 }
 
-/// The paraboloid of a landscape, through the nodes that `rule` chooses.
+/// The paraboloid of a likelihood grid, through the nodes that `rule` chooses.
 ///
 /// # Errors
 /// [`Undefined`]: no well-defined minimum.
@@ -144,7 +144,7 @@ pub fn paraboloid(landscape: &Landscape, rule: Rule) -> Result<Paraboloid, Undef
     let vertex = -&inverse * &gradient;
     let residuals = rows * &solved - chi2;
 
-    // from offsets over the reach of the region to the units of the parameters
+    // from offsets in units of the region's size to the units of the parameters
     let unit: Vec<f64> = grid.axes.iter().zip(&scale).map(|(axis, scale)| axis.spacing() * scale).collect();
     let covariance = |i: usize, j: usize| 2.0 * inverse[(i, j)] * unit[i] * unit[j];
     let reach = reach(&members);
@@ -196,7 +196,7 @@ fn polynomial(coefficients: &DVector<f64>, axes: usize) -> (f64, DVector<f64>, D
     (coefficients[0], gradient, hessian)
 }
 
-/// How far the nodes reach along each axis (in nodes).
+/// Extent of the nodes along each axis (in nodes).
 fn scale(members: &[Member]) -> Vec<f64> {
     reach(members).iter().map(|reach| (-reach.start()).max(*reach.end()).max(1) as f64).collect()
 }

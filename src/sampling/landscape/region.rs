@@ -1,33 +1,33 @@
-//! Which nodes a paraboloid is fitted to: those around the highest one.
+//! The nodes for the fit of a paraboloid: those around the highest one.
 //!
-//! The region grows from the highest node like water from a spring: of all neighbours of what is in it, the one of the
-//! largest ln L joins next. So it stays in one piece, and another maximum is not in it unless the saddle between them
-//! is. Nodes where the reconstruction failed or could not reach its target have no place in it.
+//! The region grows from the highest node: of all its neighbours, the one of the largest ln L is added next. So it is
+//! connected, and contains another maximum only together with the saddle between them. Nodes where the reconstruction
+//! failed or could not reach its target are excluded.
 
 use super::{Axis, Grid, Landscape};
 use crate::sampling::log_density::Status;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// By default all nodes up to this much above the minimum of chi2 are in, twice the error bars from it: near enough for
-/// a paraboloid, far enough that the rounding of ln L (1e-3) is nothing.
+/// By default all nodes up to this much above the minimum of chi2 are included, twice the error bars from it: close
+/// enough for a paraboloid, far enough that the rounding of ln L (1e-3) is negligible.
 pub const DELTA_CHI2: f64 = 4.0;
 
-/// What the user says of the region; by default it reaches to [`DELTA_CHI2`], or as far as a fit needs.
+/// The user's choice of region; by default it reaches to [`DELTA_CHI2`], or as far as a fit needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rule {
-    /// So many nodes.
+    /// Number of nodes.
     pub nodes: Option<usize>,
-    /// None farther from the highest one than so many nodes, along any axis; all within, if `nodes` says nothing.
+    /// Largest distance from the highest one in nodes, along any axis; all within, if `nodes` is absent.
     pub radius: Option<usize>,
 }
 
 /// A node of the region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Member {
-    /// Which node of the grid.
+    /// Index of the node in the grid.
     pub index: usize,
-    /// How many nodes it is from the highest one, along each axis; a circle is cut opposite to that one.
+    /// Distance in nodes from the highest one, along each axis; a periodic axis is cut opposite to that one.
     pub offset: Vec<isize>,
     /// chi2 above that of the highest one.
     pub delta_chi2: f64,
@@ -57,7 +57,7 @@ pub fn region(landscape: &Landscape, centre: usize, rule: Rule, enough: impl Fn(
         if full {
             break;
         }
-        // what is as high as the last one needed is in too
+        // nodes as high as the last one needed are included
         level = level.max(delta_chi2);
         for (neighbour, offset) in neighbours(grid, index, &offset) {
             let near = rule.radius.is_none_or(|radius| offset.iter().all(|o| o.unsigned_abs() <= radius));
@@ -73,13 +73,13 @@ pub fn region(landscape: &Landscape, centre: usize, rule: Rule, enough: impl Fn(
     region
 }
 
-/// The nodes next to node `index`, across corners too, where `offset` is its own.
+/// The nodes next to node `index`, across corners too, where `offset` is that of this node.
 fn neighbours(grid: &Grid, index: usize, offset: &[isize]) -> Vec<(usize, Vec<isize>)> {
     let position = grid.position(index);
     let mut found = vec![(0, Vec::new())];
     for ((axis, &k), &o) in grid.axes.iter().zip(&position).zip(offset) {
         let steps = [-1, 0, 1].map(|step| Some((moved(axis, k, step)?, o + step)));
-        // a circle is cut opposite to where it began
+        // a periodic axis is cut opposite to its start
         let steps = steps.into_iter().flatten().filter(|(_, o)| !axis.is_circle() || 2 * o.unsigned_abs() < axis.nodes);
         let steps: Vec<(usize, isize)> = steps.collect();
         found = found
@@ -94,7 +94,7 @@ fn neighbours(grid: &Grid, index: usize, offset: &[isize]) -> Vec<(usize, Vec<is
     found
 }
 
-/// The value `step` after value number `k` of an axis, if there is one.
+/// The value `step` after value number `k` of an axis, if it exists.
 fn moved(axis: &Axis, k: usize, step: isize) -> Option<usize> {
     if axis.is_circle() {
         return Some((k as isize + step).rem_euclid(axis.nodes as isize) as usize);

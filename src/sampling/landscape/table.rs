@@ -1,4 +1,4 @@
-//! The landscape in a few lines: where it is highest, whether that is on an edge, and what it cost; and its paraboloid.
+//! Summary of a likelihood grid: its highest node, whether that is on an edge, and the cost; and its paraboloid.
 
 use super::{Axis, Grid, Landscape, Paraboloid, Undefined};
 use crate::numerics::text::{aligned, listed};
@@ -19,7 +19,7 @@ pub fn table(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> St
     )
 }
 
-/// Where ln L is largest.
+/// The node of the largest ln L.
 fn best(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> Option<String> {
     let node = landscape.best()?;
     let edges = landscape.grid().edges(node.index);
@@ -86,7 +86,7 @@ pub fn paraboloid_table(
     text + &aligned(&rows)
 }
 
-/// Decimals that show so many digits of `value`.
+/// Decimals that show this many digits of `value`.
 fn digits(value: f64, digits: usize) -> usize {
     (digits as f64 - 1.0 - value.log10().floor()).clamp(0.0, 12.0) as usize
 }

@@ -21,7 +21,7 @@ fn groups() -> Vec<([u32; LANES], Vec<Block>, Vec<Pixels>)> {
         position: numbers(100 + 8 * b, filled, 0.5),
         spread: numbers(300 + 8 * b, filled, 0.0),
     };
-    // what is empty lies on a pixel of the group that is not
+    // empty lanes point to a pixel of the group that is not empty
     let pixels = |b: usize, filled: usize| std::array::from_fn(|l| if l < filled { 8 * b + l } else { 8 * b } as u32);
     let filled = [vec![8, 8, 8, 8, 7, 6, 3, 1], vec![5, 5, 4], vec![8, 8, 8, 3], vec![]];
     let mut first = 0;
@@ -34,7 +34,7 @@ fn groups() -> Vec<([u32; LANES], Vec<Block>, Vec<Pixels>)> {
     filled.iter().zip(cells).map(|(filled, cells)| group(filled, cells)).collect()
 }
 
-/// Every pair, its weight on each node of its cell: the yardstick, a pixel after another.
+/// Every pair, its weight on each node of its cell: the reference, one pixel after another.
 fn pairs() -> Vec<(usize, usize, f64)> {
     let mut pairs = Vec::new();
     for (cells, blocks, pixels) in groups() {
@@ -85,7 +85,7 @@ impl<N: Number> Task for Both<N> {
     }
 }
 
-/// Holds what all instructions give to what a plain loop over pairs gives.
+/// Compares the results of all sets of instructions with a plain loop over pairs.
 fn check<N: Number>(tolerance: f64) {
     let numbers = |count: usize| (0..count).map(|i| N::of(number(i))).collect::<Vec<N>>();
     let (x, nodes) = (numbers(PIXELS), numbers(GRID));

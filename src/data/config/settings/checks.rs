@@ -11,8 +11,7 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 /// Longest name of a set.
 const LONGEST_NAME: usize = 40;
 
-/// Velocity zero points that are off, or scatter, by more (km/s) are a mistake: profiles would be seen as the wrong
-/// part of a line.
+/// RV offsets or RV jitter above this (km/s) are mistakes: profiles would show the wrong part of a line.
 const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
 
 /// Keys of line and continuum.
@@ -23,12 +22,12 @@ pub(super) fn check_nuisances(at: &str, names: [&str; 3], priors: &LineAndContin
     names.iter().zip(priors.numbers()).try_for_each(|(name, sd)| within(&format!("{at}.{name}"), sd, [0.0, 10.0]))
 }
 
-/// A velocity zero point (km/s).
+/// An RV offset (km/s).
 pub(super) fn check_zero_point(key: &str, kms: f64) -> Result<(), Fault> {
     check_kms(key, kms, -LARGEST_ZERO_POINT_KMS)
 }
 
-/// The scatter of velocity zero points (km/s).
+/// The RV jitter (km/s).
 pub(super) fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
     check_kms(key, kms, 0.0)
 }
@@ -47,7 +46,7 @@ pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
     }
 }
 
-/// Whether a number keeps within `most`, up or down.
+/// Whether the absolute value of a number is at most `most`.
 pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
     match value.abs() <= most {
         true => Ok(()),
@@ -74,7 +73,7 @@ pub(super) fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<(),
     }
 }
 
-/// Windows of time `[start, end]` (d) that stand at `key`.
+/// Windows of time `[start, end]` (d) at `key`.
 pub(super) fn check_windows(windows: &[[f64; 2]], key: &str) -> Result<(), Fault> {
     for (k, [start, end]) in windows.iter().enumerate() {
         let key = format!("{key}[{k}]");
@@ -90,7 +89,7 @@ pub(super) fn check_windows(windows: &[[f64; 2]], key: &str) -> Result<(), Fault
 /// Endings of the files that are written beside folders of such names.
 const FILES: [&str; 4] = [".json", ".csv", ".txt", ".prof"];
 
-/// Names are folders and files of `simulate`, and labels: of things that stand at these keys and have these names.
+/// Names are folders and files of `simulate`, and labels: of items at these keys with these names.
 pub(super) fn names(all: &[(&str, &str)]) -> Result<(), Fault> {
     for (s, (key, name)) in all.iter().enumerate() {
         let fault = |problem: String| Err(Fault::new(format!("{key}.name"), problem));

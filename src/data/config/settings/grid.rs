@@ -1,4 +1,4 @@
-//! The landscape: its axes, and the priors of the search for its reference.
+//! The likelihood grid: its axes, and the priors of the search for its reference.
 
 use super::orbits::without_planet;
 use super::parameters::check_value;
@@ -7,20 +7,20 @@ use crate::data::config::written::Grid as GridSection;
 use crate::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::landscape::{Axis, Grid};
 
-/// Most nodes of a landscape: a day or so of reconstructions.
+/// Largest number of nodes of a likelihood grid: about a day of reconstructions.
 pub const MOST_NODES: usize = 1_000_000;
 
-/// Values closer than this, relative to their size, would drown in rounding.
+/// Values closer than this, relative to their size, are lost in rounding.
 const SMALLEST_SPACING: f64 = 1e-12;
 
-/// The landscape.
+/// The likelihood grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridSettings {
     /// Its nodes, the axes in the order of [`Parameter::ALL`].
     pub grid: Grid,
     /// The parameters on its axes, in the same order, with the priors of the search for the reference: those under
     /// `parameters`, or uniform along the axis. All other parameters are fixed at their values in the config. The
-    /// priors do not enter the landscape.
+    /// priors do not enter the likelihood grid.
     pub free: Vec<FreeParameter>,
 }
 
@@ -80,8 +80,8 @@ fn check_axis(parameter: Parameter, axis: &Axis) -> Result<(), Fault> {
     Err(Fault::new(key, problem))
 }
 
-/// Where the search looks for the best value of a parameter that has an axis and no prior: along the axis, and as far
-/// as the value of the config, from which it starts.
+/// Range of the search for a parameter with an axis and no prior: the axis, extended to the config's value, where the
+/// search starts.
 fn along_the_axis(parameter: Parameter, axis: &Axis, values: &ParameterValues) -> FreeParameter {
     let start = values[parameter];
     let prior = match axis.periodic {

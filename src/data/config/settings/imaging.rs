@@ -1,4 +1,4 @@
-//! The Doppler image: what makes sense with an objective, and what is known of the spots as a field.
+//! The Doppler image: the keys allowed with an objective, and the prior of the spots as a field.
 
 use super::checks::{NUISANCES, automatic, check_nuisances, check_pixels, check_windows};
 use super::parameters::check_value;
@@ -7,13 +7,13 @@ use crate::data::config::written::{Config, Hyperparameter, ImagingSettings, OfFi
 use crate::model::{Parameter, ParameterValues};
 use crate::surface::Properties;
 
-/// Largest degree of a break: harmonics go to 36.
+/// Largest turnover degree: harmonics go to 36.
 const MOST_BREAK_DEGREE: f64 = 30.0;
 
-/// What is said of spots where one map is found.
+/// Error on keys of a field with a static map.
 const OF_INTEGRATED_MAPS: &str = "only for imaging.objective \"marginal-likelihood\"";
 
-/// That what a map holds is said of a static one; the usual model need not be mentioned.
+/// Checks that the content of a map is given only with a static one; the default may be given too.
 pub(super) fn check_brightness(imaging: &mut ImagingSettings) -> Result<(), Fault> {
     if imaging.brightness.is_some() && imaging.objective.properties().has_field {
         let problem = "no effect with imaging.objective \"marginal-likelihood\" (the default), whose maps may be \
@@ -60,7 +60,7 @@ pub(super) fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -
     automatic("imaging.chi2_target", imaging.chi2_target)
 }
 
-/// What tells the seasons apart.
+/// How seasons are separated.
 fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
     const GAP: &str = "imaging.season_gap_d";
     let ImagingSettings { season_gap_d: gap, seasons, .. } = imaging;
@@ -88,8 +88,8 @@ fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
     }
 }
 
-/// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit. What is
-/// left to the profiles is free in a chain: with a weak prior, all over those bounds.
+/// Keys of the spots are allowed where spots are marginalised over, within the bounds of a fit. Those left to the
+/// profiles are free in a chain, under a weak prior over the whole range.
 pub(super) fn resolve_field(written: &mut Config, values: &mut ParameterValues) -> Result<(), Fault> {
     let imaging = &written.imaging;
     let has_field = imaging.objective.properties().has_field;

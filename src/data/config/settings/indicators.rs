@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// An activity indicator.
 #[derive(Clone, Debug)]
 pub struct IndicatorSettings {
-    /// Where it stands in the config.
+    /// Its key in the config.
     pub key: String,
     /// Its name.
     pub name: String,

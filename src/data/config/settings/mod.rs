@@ -1,5 +1,5 @@
-//! The settings, which programs use: what is written, checked, with all defaults, in the units of the parts it is for,
-//! nothing left to decide. What is made of a section is in a file of its name.
+//! The settings that programs use: the written config, checked, with all defaults, in the units of its consumers. Each
+//! section is resolved in a file of its name.
 
 mod checks;
 mod grid;
@@ -40,7 +40,7 @@ use plan::resolve_plan;
 use star::{fitted_star, resolve_instrument, resolve_star};
 use std::path::{Path, PathBuf};
 
-/// A stability is no better than this (km/s).
+/// Smallest stability (km/s).
 const BEST_STABILITY_KMS: f64 = 1e-4;
 
 /// A whole config, resolved.
@@ -48,7 +48,7 @@ const BEST_STABILITY_KMS: f64 = 1e-4;
 pub struct Settings {
     /// The config file.
     pub path: PathBuf,
-    /// The star, whatever data sets say of it.
+    /// The star without the overrides of data sets.
     pub star: StarSettings,
     /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter. `None` where the
     /// config has neither `instrument.name` nor `instrument.stability_ms`.
@@ -63,9 +63,9 @@ pub struct Settings {
     pub light_curves: Vec<LightCurveSettings>,
     /// The activity indicators, mostly none.
     pub indicators: Vec<IndicatorSettings>,
-    /// What is planned beside them, mostly nothing.
+    /// Planned observations, mostly none.
     pub plan: Vec<PlannedProfiles>,
-    /// Scatter of the profiles' velocity zero points.
+    /// RV jitter of the profiles.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
     pub imaging: ImagingSettings,
@@ -75,9 +75,9 @@ pub struct Settings {
     pub sampler: SamplerSettings,
     /// Numbers of the star that are fitted to the profiles.
     pub fitted: Vec<Parameter>,
-    /// A drift of the velocities that is integrated out; `None` where the profiles are to say whether there is one.
+    /// An RV drift that is marginalised over; `None` where the profiles decide whether there is one.
     pub drift: Option<VelocityDrift>,
-    /// The landscape.
+    /// The likelihood grid.
     pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
@@ -86,7 +86,7 @@ pub struct Settings {
     pub sha256: String,
 }
 
-/// Walkers of each ensemble where all maps are integrated over, if their number is not given.
+/// Default number of walkers per ensemble under a marginal likelihood.
 const FEW_WALKERS: usize = 16;
 
 /// Checks the config that was read from the file at `path`, and fills in its defaults.
@@ -150,8 +150,8 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
     })
 }
 
-/// The velocity jitter, its default filled in. A field takes zero points that nobody told it of for spots that change
-/// or for planets.
+/// The RV jitter, its default filled in. Without it a field would attribute RV offsets of profiles to evolving spots or
+/// planets.
 fn resolve_jitter(written: &mut Config) -> VelocityJitter {
     let objective = written.imaging.objective;
     if has_own_jitters(written) {
@@ -240,7 +240,7 @@ fn resolve_sampler(written: &mut Config, free: usize) -> Result<(), Fault> {
 }
 
 impl Settings {
-    /// The free parameters, for commands that cannot do without.
+    /// The free parameters, for commands that require some.
     ///
     /// # Errors
     /// If there is none.
@@ -251,7 +251,7 @@ impl Settings {
         }
     }
 
-    /// The landscape, for the command that cannot do without.
+    /// The likelihood grid, for the command that requires it.
     ///
     /// # Errors
     /// If the config has no `grid`.
@@ -262,7 +262,7 @@ impl Settings {
     /// Whether profiles of `star` in velocity bins of `step_kms` can be computed at `values`.
     ///
     /// # Errors
-    /// If the local line is so narrow, or the star so fast, that the velocity grid grows out of hand.
+    /// If the local line is so narrow, or the star so fast, that the velocity grid becomes too large.
     pub fn check_velocity_grid(
         &self,
         star: &StarSettings,
@@ -287,8 +287,8 @@ impl Settings {
         Ok(())
     }
 
-    /// The config with other observations in place of its own, those of each data set in a list at `path_of` it; cut
-    /// and errors of observed ones stay.
+    /// The config with other observations, those of each data set in a list at `path_of` it; velocity range and
+    /// uncertainties of observed ones are kept.
     pub fn with_observations(&self, path_of: impl Fn(&DataSetSettings) -> String) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {
@@ -309,8 +309,7 @@ impl Settings {
         config
     }
 
-    /// Tables of light curves by paths that hold from anywhere; simulated ones, which go with simulated profiles, are
-    /// left out.
+    /// Tables of light curves by absolute paths; simulated ones, which belong to simulated profiles, are left out.
     fn with_light_curves_from_here(&self, config: &mut serde_json::Value) {
         let Some(written) = config.get("photometry").cloned() else { return };
         let sections = written.as_array().cloned().unwrap_or_else(|| vec![written]);
@@ -326,7 +325,7 @@ impl Settings {
         }
     }
 
-    /// Tables of indicators by paths that hold from anywhere.
+    /// Tables of indicators by absolute paths.
     fn with_indicators_from_here(&self, config: &mut serde_json::Value) {
         let sections = match config.get_mut("indicators") {
             Some(serde_json::Value::Array(sections)) => sections.iter_mut().collect(),
@@ -348,11 +347,11 @@ impl Settings {
         first["simulate"].get("faculae").cloned()
     }
 
-    /// What is known of the field of spots before the profiles, where maps are integrated over.
+    /// The prior of the field of spots under a marginal likelihood.
     pub fn known_field(&self) -> Known {
         let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.imaging;
         let priors = Parameter::FIELD.map(|p| self.free.iter().find(|f| f.parameter == p).map(|f| f.prior));
-        // a number beside a prior is where a chain starts
+        // a value given with a prior is the start of a chain
         let number = |i: usize, given: Hyperparameter| given.number().filter(|_| priors[i].is_none());
         Known {
             amplitude: number(0, spot_amplitude),
@@ -369,7 +368,7 @@ impl Settings {
         }
     }
 
-    /// That something is wrong with a key.
+    /// An error at a key.
     pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
@@ -396,7 +395,7 @@ mod tests {
         };
         let many = ["vsini_kms", "inclination_deg", "porb_over_prot", "line_sigma_kms"];
         assert_eq!(walkers("spottedness", &many, None), 32);
-        // with the three numbers of the spots
+        // with the three hyperparameters of the spots
         assert_eq!([walkers("marginal-likelihood", &[], None), walkers("marginal-likelihood", &many, None)], [16, 18]);
         assert_eq!(walkers("marginal-likelihood", &many, Some(40)), 40);
     }

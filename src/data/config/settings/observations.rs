@@ -1,4 +1,4 @@
-//! The data sets: what each says of itself, and what only one of them may say.
+//! The data sets: the settings of each, and those allowed for one only.
 
 use super::checks::{
     NUISANCES, automatic, check_jitter, check_nuisances, check_size, check_windows, check_zero_point, most, names,
@@ -18,22 +18,22 @@ use crate::surface::calibration::noise::ErrorSettings;
 use crate::surface::nuisances::LineAndContinuum;
 use std::path::{Path, PathBuf};
 
-/// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
+/// Range of continuum levels that profiles may be divided by: outside, they are in other units.
 const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// A data set.
 #[derive(Clone, Debug)]
 pub struct DataSetSettings {
-    /// Where it stands in the config.
+    /// Its key in the config.
     pub key: String,
     /// Its name.
     pub name: String,
-    /// The star as it sees it; where the equivalent width of its line is left to the profiles,
+    /// The star with the overrides of this set; where the equivalent width of its line is left to the profiles,
     /// [`star_for`](crate::data::calibrated::star_for) measures it.
     pub star: StarSettings,
-    /// Active regions as this set alone sees them.
+    /// Overrides of active regions for this set.
     pub regions: Option<Regions>,
-    /// Limb darkening of this set alone.
+    /// Override of the limb darkening for this set.
     pub limb_darkening: Option<LimbDarkening>,
     /// Whether the contrast of spots is fitted to its profiles.
     pub fits_contrast: bool,
@@ -41,22 +41,22 @@ pub struct DataSetSettings {
     pub source: ObservationSource,
     /// Line and continuum of each profile.
     pub nuisances: Option<LineAndContinuum>,
-    /// Its RV jitter over the largest of all sets.
+    /// Its RV jitter in units of the largest of all sets.
     pub jitter_share: f64,
-    /// Standard deviation of the RV offsets of nights (km/s).
+    /// Standard deviation of nightly RV offsets (km/s).
     pub night_jitter_kms: Option<f64>,
-    /// Velocity that all profiles have too much.
+    /// RV offset of all its profiles.
     pub zero_point: ZeroPoint,
     /// Exposure time (s) of profiles whose own is not known.
     pub exposure_s: Option<f64>,
     /// Windows of time (d) whose profiles are left out.
     pub exclude: Vec<[f64; 2]>,
-    /// What is known of profiles that the others do not predict; `None` where they are not looked for.
+    /// Prior of events, profiles that the others do not predict; `None` where events are not sought.
     pub events: Option<EventWindows>,
 }
 
 impl DataSetSettings {
-    /// What is simulated.
+    /// The simulation.
     pub fn simulation(&self) -> Option<&Simulation> {
         match &self.source {
             ObservationSource::Simulate(simulation) => Some(simulation),
@@ -86,9 +86,9 @@ pub enum ObservationSource {
         velocity_range_kms: Option<(f64, f64)>,
         /// Factor on every sigma, 1 where that is left to the observations.
         sigma_scale: f64,
-        /// Level of the continuum in the files: what is read is divided by it.
+        /// Level of the continuum in the files: profiles read are divided by it.
         continuum_level: f64,
-        /// What the observations are to say of their errors.
+        /// Measurement of uncertainties from the observations.
         errors: ErrorSettings,
     },
     /// A simulation.
@@ -159,8 +159,8 @@ pub(super) fn resolve_sets(
     Ok(sets)
 }
 
-/// What is wrong with an exposure of this length (s), if anything is: one over which the model averages shows nearly
-/// the same side of the star all the time.
+/// The error of an exposure of this length (s), if any: within an exposure the model averages over, the star must show
+/// nearly the same side.
 pub fn too_long(exposure_s: f64, star: &StarSettings) -> Option<String> {
     if !(exposure_s >= 0.0 && exposure_s.is_finite()) {
         return Some(format!("{exposure_s} s must be 0 or more"));
@@ -175,7 +175,7 @@ pub fn too_long(exposure_s: f64, star: &StarSettings) -> Option<String> {
     })
 }
 
-/// What is known of events, checked; they are looked for where maps evolve.
+/// The prior of events, checked; they are sought where maps evolve.
 fn events(written: Option<&EventsKey>, has_field: bool, key: &str) -> Result<Option<EventWindows>, Fault> {
     let key = format!("{key}.events");
     match written {
@@ -190,7 +190,7 @@ fn events(written: Option<&EventsKey>, has_field: bool, key: &str) -> Result<Opt
     }
 }
 
-/// Whether each data set has a jitter of its own.
+/// Whether each data set has its own jitter.
 pub(super) fn has_own_jitters(written: &Config) -> bool {
     let sections = &written.observations.sections;
     let is_number = |section: &ObservationsSection| section.velocity_jitter_kms.is_some_and(|jitter| !jitter.is_word());
@@ -203,7 +203,7 @@ pub(super) fn largest_jitter_kms(sections: &[ObservationsSection]) -> f64 {
     numbers.fold(0.0, f64::max)
 }
 
-/// What several sets need, and what one has no use for.
+/// Keys required for several sets, or useless for one.
 fn check_several(written: &Config) -> Result<(), Fault> {
     let sections = &written.observations.sections;
     let objective = written.imaging.objective;
@@ -307,7 +307,7 @@ fn source(
     Ok(ObservationSource::Files { path, velocity_range_kms, sigma_scale, continuum_level, errors })
 }
 
-/// The star as a set sees it: with its own line, spot contrast and resolving power, where it has any.
+/// The star for a set: with the line, spot contrast and resolving power of the set, where it has any.
 fn star_of(
     written: &Config,
     s: usize,
@@ -359,13 +359,13 @@ fn star_of(
         return Ok(star.clone());
     }
     resolve_star(&mut own, &instrument).map_err(|fault| {
-        // what the star and the instrument say is sound by itself
+        // values of star and instrument are already checked
         let name = fault.key.trim_start_matches("star.").trim_start_matches("instrument.");
         Fault::new(format!("{key}.{name}"), fault.problem)
     })
 }
 
-/// Of several simulated sets the first has the star: its spots are those of all.
+/// Of several simulated sets the first defines the star: its spots are shared by all.
 fn of_one_star(written: &Config, sets: &mut [DataSetSettings]) -> Result<(), Fault> {
     let Some(first) = written.observations.sections[0].simulate.as_ref().filter(|_| sets.len() > 1) else {
         return Ok(());

@@ -1,5 +1,5 @@
-//! The orbits: which planets there are, ephemerides in place of period and phase, eccentricity, and whether two planets
-//! can last.
+//! The orbits: which planets there are, ephemerides in place of period and phase, eccentricity, and stability of two
+//! planets.
 
 use super::checks::positive;
 use super::parameters::check_value;
@@ -9,7 +9,7 @@ use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, P
 use crate::star::{StarSettings, stability};
 
 /// Fills the orbits into `values`, where K, period and phase of the planet are as in the config: eccentricities, the
-/// second planet, and what ephemerides stand for.
+/// second planet, and the periods and phases given by ephemerides.
 pub(super) fn resolve_orbits(written: &Config, values: &mut ParameterValues, star: &StarSettings) -> Result<(), Fault> {
     let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
     let [first, second] = &Elements::PLANETS;
@@ -36,7 +36,7 @@ pub(super) fn resolve_orbits(written: &Config, values: &mut ParameterValues, sta
     Ok(())
 }
 
-/// Where eccentricities that are free begin, in units of the square root of the largest.
+/// Start of free eccentricities, in units of the square root of the largest.
 const START_SHAPE: [f64; 2] = [0.2, 0.1];
 
 fn resolve_orbit(written: &Config, of: &Elements, values: &mut ParameterValues, clock: Clock) -> Result<(), Fault> {
@@ -46,7 +46,7 @@ fn resolve_orbit(written: &Config, of: &Elements, values: &mut ParameterValues, 
         value.map_or(Ok(()), |value| check_value(p, value, p.spec().config_key))?;
         Ok(value)
     };
-    // where the config says nothing a search begins in the middle of the prior
+    // without a value in the config a search begins in the middle of the prior
     let start = |p: Parameter| -> Result<Option<f64>, Fault> {
         let middle = written.parameters.get(p).and_then(|section| {
             section.mean.or_else(|| section.min.zip(section.max).map(|(min, max)| 0.5 * (min + max)))
@@ -71,7 +71,7 @@ fn resolve_orbit(written: &Config, of: &Elements, values: &mut ParameterValues, 
     let shape = [given(of.shape[0])?, given(of.shape[1])?];
     let any = shape.iter().any(Option::is_some) || of.shape.iter().any(|p| written.is_free(*p));
     if any {
-        // where it is looked for a search does not begin at the circle, which is a saddle
+        // where it is free a search does not begin at a circular orbit, a saddle point
         let largest = written.parameters.get(of.shape[0]).and_then(|section| section.max).unwrap_or(1.0);
         let begin = if free == [true, true] && shape == [None, None] {
             START_SHAPE.map(|x| x * largest.abs().min(1.0).sqrt())
@@ -119,7 +119,7 @@ pub(super) fn start_of(parameter: Parameter, prior: &Prior, values: &ParameterVa
     if !parameter.is_ephemeris() {
         return start;
     }
-    // what rounding has moved over a bound
+    // a value that rounding has moved over a bound
     let (min, max) = prior.bounds();
     let rounding = 1e-12 * start.abs();
     if start < min && start > min - rounding {
@@ -131,8 +131,8 @@ pub(super) fn start_of(parameter: Parameter, prior: &Prior, values: &ParameterVa
     }
 }
 
-/// Whether the orbits make sense together: eccentricities of one planet share a bound, a conjunction is one of its own
-/// period, and two planets last beside each other at the start.
+/// Whether the orbits are consistent: eccentricities of one planet share a bound, a conjunction belongs to the period
+/// of its planet, and two planets are stable at the start.
 pub(super) fn check_orbits(
     free: &[FreeParameter],
     values: &ParameterValues,
@@ -182,7 +182,7 @@ pub(super) fn check_orbits(
     Ok(())
 }
 
-/// The shortest period that a prior allows, to all that matters.
+/// The shortest period that a prior allows, except for negligible tails.
 fn shortest(prior: &Prior) -> f64 {
     match *prior {
         Prior::Normal { mean, sd, min, .. } => min.max(mean - 4.0 * sd),

@@ -7,7 +7,7 @@ use crate::model::parameters::{Interval, Spec};
 use crate::model::{Parameter, Prior, PriorKind};
 use std::ops::{Bound, RangeBounds};
 
-/// Whether a value makes sense at all, whatever the prior.
+/// Whether a value is valid, whatever the prior.
 pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result<(), Fault> {
     let Spec { values, most, .. } = parameter.spec();
     match values.contains(&value) && value.is_finite() {
@@ -42,7 +42,7 @@ fn domain(parameter: Parameter, phi_free: bool) -> (f64, f64) {
     }
 }
 
-/// The prior that a section under `parameters` stands for.
+/// The prior given by a section under `parameters`.
 pub(super) fn resolve_prior(parameter: Parameter, section: &PriorSection, phi_free: bool) -> Result<Prior, Fault> {
     let reader = Reader { parameter, section, phi_free };
     let kind = section.prior;

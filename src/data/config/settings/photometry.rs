@@ -7,27 +7,27 @@ use crate::data::config::written::{Config, OutlierTreatment, PhotometrySection, 
 use crate::star::Band;
 use std::path::{Path, PathBuf};
 
-/// Longest gap within a segment (d): level and slope do not hold for longer.
+/// Longest gap within a segment (d): level and slope do not persist for longer.
 const LONGEST_GAP_D: f64 = 1000.0;
 
 /// A light curve.
 #[derive(Clone, Debug)]
 pub struct LightCurveSettings {
-    /// Where it stands in the config.
+    /// Its key in the config.
     pub key: String,
     /// Its name.
     pub name: String,
-    /// What of the star looks different in it.
+    /// Properties of the star that differ in its band.
     pub band: Band,
     /// Where it comes from.
     pub source: LightSource,
-    /// Gaps longer than this (d) part segments.
+    /// Gaps longer than this (d) separate segments.
     pub segment_gap_d: f64,
     /// Factor on the standard errors.
     pub sigma_scale: f64,
     /// Windows `[start, end]` (d) whose measurements are left out.
     pub exclude: Vec<[f64; 2]>,
-    /// What becomes of measurements that no spot explains.
+    /// Treatment of measurements that no spot explains.
     pub outliers: OutlierTreatment,
 }
 
@@ -80,7 +80,7 @@ pub(super) fn resolve_photometry(written: &Config, config: &Path) -> Result<Vec<
     Ok(curves)
 }
 
-/// Contrast and limb darkening, as far as they are not the star's.
+/// Contrast and limb darkening where they differ from the star's.
 fn band(written: &Config, section: &PhotometrySection, key: &str) -> Result<Band, Fault> {
     let mut own = written.star.clone();
     let at_key = |fault: Fault| Fault::new(format!("{key}.{}", fault.key.trim_start_matches("star.")), fault.problem);
@@ -107,7 +107,7 @@ fn band(written: &Config, section: &PhotometrySection, key: &str) -> Result<Band
     Ok(Band { contrast, limb_darkening })
 }
 
-/// That a cadence (d) and an error, in units of the flux, make sense; `key` is the section that has them.
+/// Checks a cadence (d) and an error in units of the flux; `key` is their section.
 pub(super) fn check_light(key: &str, cadence_d: f64, sigma: f64) -> Result<(), Fault> {
     let [cadence, error] = ["cadence_d", "sigma"].map(|field| format!("{key}.{field}"));
     positive(&cadence, cadence_d)?;

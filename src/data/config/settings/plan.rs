@@ -1,4 +1,4 @@
-//! What is planned beside the observations.
+//! Planned observations.
 
 use super::checks::{check_size, most, positive};
 use super::observations::DataSetSettings;
@@ -12,7 +12,7 @@ use crate::star::Band;
 /// Profiles that are planned for a data set.
 #[derive(Clone, Debug)]
 pub struct PlannedProfiles {
-    /// Where they stand in the config.
+    /// Their key in the config.
     pub key: String,
     /// Number of their data set, from 0.
     pub set: usize,
@@ -22,7 +22,7 @@ pub struct PlannedProfiles {
     pub section: PlanSection,
 }
 
-/// What is planned, checked.
+/// The planned observations, checked.
 pub(super) fn resolve_plan(
     written: &Config,
     sets: &[DataSetSettings],

@@ -11,11 +11,11 @@ use crate::model::{Clock, Elements, Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
 use crate::surface::nuisances::LineAndContinuum;
 
-/// More drawn at random are a mistake: nights times profiles, and spots.
+/// Largest numbers drawn at random: nights times profiles, and spots.
 const MOST_PROFILES: usize = 10_000;
 const MOST_SPOTS: f64 = 10_000.0;
 
-/// Where a key of the simulation of a data set stands.
+/// The path of a key of the simulation of a data set.
 fn at(set: &str, field: &str) -> String {
     format!("{set}.simulate.{field}")
 }
@@ -79,7 +79,7 @@ pub(super) fn simulation(
     })
 }
 
-/// Noise that is correlated over more bins is a mistake.
+/// Largest correlation length of the noise in bins.
 const MOST_CORRELATED_BINS: f64 = 1000.0;
 
 /// Number of velocity bins; the last lies at or below `max`.
@@ -125,7 +125,7 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str)
     Ok(times_d)
 }
 
-/// Whether the schedule at `key` makes sense.
+/// Whether the schedule at `key` is valid.
 pub(super) fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
     let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
         *schedule;
@@ -233,7 +233,7 @@ fn random_spots(
     Ok(random.drawn(truth[Parameter::Inclination], [first, last]))
 }
 
-/// Spots drawn at random are not smaller than this (degrees): no pixel would see them.
+/// Spots drawn at random are not smaller than this (degrees): they would be lost between pixels.
 const SMALLEST_DEG: f64 = 0.01;
 
 /// Most brightness that a facula may add, in units of the photosphere's.

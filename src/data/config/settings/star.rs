@@ -33,7 +33,7 @@ fn check_name(key: &str, name: &str) -> Result<(), Fault> {
     Err(Fault::new(key, problem))
 }
 
-/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s) where that is known.
+/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s) where known.
 pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<Option<f64>, Fault> {
     const NAME: &str = "instrument.name";
     if let Some(name) = &instrument.name {
@@ -88,7 +88,7 @@ fn numbers(section: &RegionsSection) -> [Option<f64>; Parameter::REGIONS.len()] 
     [line_width, equivalent_width, shift_kms, area, area_limb, dimming_limb].map(|number| number.number())
 }
 
-/// Active regions as far as they are given.
+/// Active regions with the given keys.
 fn regions(section: &RegionsSection) -> Result<Regions, Fault> {
     let numbers = numbers(section);
     for (parameter, number) in Parameter::REGIONS.into_iter().zip(numbers) {
@@ -103,8 +103,8 @@ fn regions(section: &RegionsSection) -> Result<Regions, Fault> {
     Ok(Regions { line_width, equivalent_width, shift_kms, area, area_limb, dimming_limb })
 }
 
-/// Which numbers of active regions are fitted: those that are not given. Without regions that are more than spots
-/// their line counts for nothing.
+/// Which numbers of active regions are fitted: those that are not given. Without regions beyond spots their line has no
+/// effect.
 fn fitted_regions(section: &RegionsSection) -> Vec<Parameter> {
     let numbers = numbers(section);
     let none = numbers[3..].iter().all(|number| *number == Some(0.0));
@@ -112,7 +112,7 @@ fn fitted_regions(section: &RegionsSection) -> Vec<Parameter> {
     if none { Vec::new() } else { fitted.map(|(parameter, _)| parameter).collect() }
 }
 
-/// Numbers beside those of active regions that may be fitted (`star.fitted`).
+/// Parameters other than those of active regions that may be fitted (`star.fitted`).
 pub const FITTED: [Parameter; 4] =
     [Parameter::LineSigma, Parameter::EquivalentWidth, Parameter::Vsini, Parameter::LimbDarkening];
 

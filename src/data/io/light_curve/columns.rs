@@ -1,4 +1,4 @@
-//! Which columns of a table are those of a light curve, by the names that observers and archives give them.
+//! Which columns of a table are those of a light curve, by names used by observers and archives.
 
 use crate::data::io::table::{self, Lines, Name, Table, readings};
 use std::collections::{HashMap, HashSet};
@@ -11,7 +11,7 @@ pub(super) enum Brightness {
     Indicator,
 }
 
-/// What a table is of.
+/// The kind of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Of {
     LightCurve,
@@ -19,7 +19,7 @@ pub(super) enum Of {
 }
 
 impl Of {
-    /// The columns that are due.
+    /// The required columns.
     fn columns(self) -> &'static str {
         match self {
             Of::LightCurve => "time, flux, sigma",
@@ -28,11 +28,11 @@ impl Of {
     }
 }
 
-/// Names of times that are Julian dates, or days of whatever count; those before others are taken first.
+/// Names of times that are Julian dates, or days in any time system; in order of preference.
 const TIMES: [&str; 14] =
     ["time", "times", "bjd", "bjdtdb", "bjdutc", "hjd", "hjdutc", "jd", "jdutc", "t", "tmid", "midtime", "days", "day"];
 
-/// Names of days from another zero point, and it.
+/// Names of days with another origin, and that origin.
 const ZERO_POINTS: [(&str, f64); 12] = [
     ("btjd", BTJD),
     ("tjd", BTJD),
@@ -48,13 +48,13 @@ const ZERO_POINTS: [(&str, f64); 12] = [
     ("rbjd", RJD),
 ];
 
-/// Zero points of days as Julian dates.
+/// Origins of time systems as Julian dates.
 pub const BTJD: f64 = 2_457_000.0;
 pub const BKJD: f64 = 2_454_833.0;
 pub const MJD: f64 = 2_400_000.5;
 pub const RJD: f64 = 2_400_000.0;
 
-/// Names of fluxes; those before others are taken first.
+/// Names of fluxes; in order of preference.
 const FLUXES: [&str; 19] = [
     "flux",
     "fluxes",
@@ -94,11 +94,11 @@ const MAGNITUDES: [&str; 13] = [
     "magcorr",
 ];
 
-/// What stands before or after the name of a column in that of its error.
+/// Prefixes and suffixes that turn the name of a column into that of its error.
 const OF_ERRORS: [&str; 11] =
     ["err", "error", "errors", "sigma", "sig", "uncertainty", "unc", "e", "d", "std", "stddev"];
 
-/// Names of errors of whatever there is.
+/// Names of errors of any quantity.
 const ERRORS: [&str; 14] = [
     "sigma",
     "fluxerr",
@@ -135,10 +135,10 @@ const BANDS: [&str; 6] = ["filter", "filt", "filtercode", "band", "passband", "b
 /// Units of time that are days.
 const DAYS: [&str; 11] = ["", "d", "day", "days", "jd", "bjd", "hjd", "bjdtdb", "tdb", "utc", "jdutc"];
 
-/// What flags say of good rows in words.
+/// Words of flags for good rows.
 const GOOD: [&str; 5] = ["g", "good", "ok", "a", "pass"];
 
-/// The line of names is looked for among so many.
+/// Largest number of lines searched for the line of names.
 const MOST_LINES: usize = 100;
 
 /// The columns of a light curve by their numbers.
@@ -153,17 +153,17 @@ pub(super) struct Columns {
     pub brightness: Brightness,
     /// Whether the brightness has a unit, in brackets or in its name.
     pub has_unit: bool,
-    /// From where days are counted (JD), where that is said and is not 0.
+    /// The origin of times (JD), where given and not 0.
     pub zero_jd: Option<f64>,
-    /// What has to be known of the choice.
+    /// Remarks on the choice.
     pub remarks: Vec<String>,
 }
 
 impl Columns {
-    /// Those of a table with this text.
+    /// The columns of a table with this text.
     ///
     /// # Errors
-    /// What is missing.
+    /// A missing column.
     pub fn of(table: &Table, text: &str, of: Of) -> Result<Self, String> {
         let count = table.rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
         // rows without a flux may come first, which are no names, and rows whose last cell is empty look shorter
@@ -193,7 +193,7 @@ impl Columns {
         }
     }
 
-    /// The three of a table without names.
+    /// The three columns of a table without names.
     fn unnamed(of: Of) -> Self {
         let name = |bare: &str| Name { written: bare.into(), bare: bare.into(), unit: String::new() };
         let (value, brightness) = match of {
@@ -272,8 +272,8 @@ impl Columns {
         })
     }
 
-    /// Those of an activity indicator: its value is in the column `value`, or else in the first that is no time, error
-    /// or flag.
+    /// Those of an activity indicator: its value is in the column `value`, or else in the first that is not a time,
+    /// error or flag.
     fn of_indicator(names: &[Name]) -> Result<Self, String> {
         let missing = |what: &str| {
             let written: Vec<&str> = names.iter().map(|name| name.written.as_str()).collect();
@@ -319,7 +319,7 @@ impl Columns {
         })
     }
 
-    /// The name of a column, as it is written.
+    /// The name of a column as written.
     pub fn name(&self, column: usize) -> &str {
         &self.names[column].written
     }
@@ -333,7 +333,7 @@ fn time(names: &[Name]) -> Option<usize> {
     plain.or_else(|| names.iter().position(|name| zero_jd(&name.bare).is_some()))
 }
 
-/// The zero point (JD) that the name of a time has: that of "BTJD", "BJD - 2457000", "time_mjd".
+/// The origin (JD) given by the name of a time, such as "BTJD", "BJD - 2457000", "time_mjd".
 fn zero_jd(bare: &str) -> Option<f64> {
     let name = bare.strip_prefix("time").filter(|rest| !rest.is_empty()).unwrap_or(bare);
     if let Some((_, zero)) = ZERO_POINTS.iter().find(|(one, _)| *one == name) {
@@ -347,13 +347,13 @@ fn zero_jd(bare: &str) -> Option<f64> {
     }
 }
 
-/// Whether a name that begins as one of brightness is that, and not its error: `flux_mjy`, not `flux_err`.
+/// Whether a name that begins like one of brightness is not that of its error: `flux_mjy`, not `flux_err`.
 fn is_value(bare: &str, of: &str) -> bool {
     let rest = &bare[of.len()..];
     ["mjy", "jy", "e/s", "adu", "counts", "erg"].iter().any(|unit| rest.starts_with(unit)) && !rest.ends_with("err")
 }
 
-/// Whether the flag of a row says that it is bad: a number other than 0, or a word that is none for good.
+/// Whether the flag of a row says that it is bad: a number other than 0, or a word that does not mean good.
 pub(super) fn is_flagged(cell: &str) -> bool {
     match table::number(cell) {
         Ok(number) => number != 0.0 && !number.is_nan(),

@@ -1,9 +1,9 @@
-//! From where the days of a light curve are counted, and from where those of the profiles.
+//! The time systems of a light curve and of the profiles.
 
 use super::Measurements;
 use super::columns::{BKJD, BTJD, MJD, RJD};
 
-/// Counts of days that are in use: what they are called, and their zero point as a Julian date.
+/// Time systems in use: their names, and their origins as Julian dates.
 const COUNTS: [(&str, f64); 6] = [
     ("JD", 0.0),
     ("TESS's BTJD (BJD - 2457000)", BTJD),
@@ -13,8 +13,8 @@ const COUNTS: [(&str, f64); 6] = [
     ("JD - 2450000", 2_450_000.0),
 ];
 
-/// What has to be added to times (d) to bring one of them within `near_d` of one of the profiles', if one of these
-/// counts of days was taken for another: words for both, and the days.
+/// What has to be added to times (d) to bring one of them within `near_d` of one of the profiles', if one of these time
+/// systems was mistaken for another: names of both, and the shift.
 pub fn fitting(times_d: &[f64], of_profiles: &[f64], near_d: f64) -> Option<([&'static str; 2], f64)> {
     let pairs = COUNTS.iter().flat_map(|own| COUNTS.iter().map(move |other| (own, other)));
     let add = |((own, from), (other, to)): (&(&'static str, f64), &(&'static str, f64))| ([*own, *other], from - to);
@@ -29,7 +29,7 @@ fn distance(times_d: &[f64], moved_d: f64, of_profiles: &[f64]) -> f64 {
 }
 
 impl Measurements {
-    /// Counts days as the profiles of these times (d) do, where the table says how its own are counted.
+    /// Converts times to the time system of profiles at these times (d), where the table gives its own.
     pub fn count_as(&mut self, of_profiles: &[f64]) {
         let Some(zero_jd) = self.zero_jd.filter(|_| !of_profiles.is_empty()) else { return };
         let mut times_d: Vec<f64> = self.fluxes.iter().map(|one| one.time_d).collect();
@@ -37,7 +37,7 @@ impl Measurements {
         let every = times_d.len().div_ceil(1000);
         times_d = times_d.into_iter().step_by(every).collect();
         let add = |(_, zero): &(&str, f64)| zero_jd - zero;
-        /// Counts that differ by less than this (d) are not told apart: the first of them is taken.
+        /// Time systems that differ by less than this (d) are not distinguished: the first of them is taken.
         const ALIKE_D: f64 = 2.0;
         let off = |add: f64| (distance(&times_d, add, of_profiles) / ALIKE_D).floor();
         let counts = std::iter::once(0.0).chain(COUNTS.iter().map(add));
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(counted(BTJD, 2001.5, 2_459_003.0), (2_459_001.5, 1));
         assert_eq!(counted(BKJD, 4168.5, 2_459_003.0), (2_459_001.5, 1));
         assert_eq!(counted(MJD, 59001.0, 2_459_003.0), (2_459_001.5, 1));
-        // profiles by MJD, or by the same count
+        // profiles in MJD, or in the same time system
         assert_eq!(counted(BTJD, 2001.5, 59002.0), (59001.0, 1));
         assert_eq!(counted(BTJD, 2001.5, 2003.0), (2001.5, 0));
     }

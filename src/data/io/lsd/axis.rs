@@ -17,7 +17,7 @@ pub(super) struct Axis {
 /// How far a point may be off the uniform axis, in steps.
 const UNIFORMITY: f64 = 0.01;
 
-/// Velocities rounded by more than this, in steps, say nothing of their axis.
+/// Velocities rounded by more than this, in steps, do not determine their axis.
 const COARSEST: f64 = 0.5;
 
 /// Part of the last digit by which an axis through rounded velocities may miss them: half, and the error of the fit.

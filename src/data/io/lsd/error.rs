@@ -1,4 +1,4 @@
-//! What can be wrong with a list of observations or a profile: one line each, naming file and line.
+//! Errors of a list of observations or a profile: one line each, naming file and line.
 
 use crate::data::io::FileError;
 use crate::data::io::atomic::WriteError;
@@ -19,7 +19,7 @@ pub enum LsdError {
         line: usize,
         /// The file it names.
         profile: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         source: std::io::Error,
     },
     /// Two profiles differ in their velocity axes.
@@ -33,7 +33,7 @@ pub enum LsdError {
         first: PathBuf,
         /// The axis of that one.
         expected: String,
-        /// By how much, and what to do.
+        /// The difference, and advice.
         cure: String,
     },
     /// A file could not be written.

@@ -1,25 +1,25 @@
-//! What stands before the rows of a profile, and how its rows are laid out.
+//! The lines before the rows of a profile, and the layout of its rows.
 //!
 //! - Donati's text format (Donati et al. 1997, MNRAS 291, 658), as LSDpy and SpecpolFlow write it (`prof.save` in
 //!   `lsdpFunc.py` of <https://github.com/folsomcp/LSDpy>, `LSD.save` in `profileLSD.py` of
 //!   <https://github.com/folsomcp/specpolFlow>): a title; a line `npoints ncolumns` with the columns after the velocity
 //!   (2: I, sigma; 6: V, sigma, null, sigma as well; 8: another null, sigma).
 //! - iLSD (Kochukhov et al. 2010, A&A 524, A5; README of <https://github.com/okochukhov/iLSD>): a line `bins profiles
-//!   S/N chi2`; rows of velocity, profile, sigma; before each further profile a line of its own `S/N chi2`.
+//!   S/N chi2`; rows of velocity, profile, sigma; before each further profile its own line `S/N chi2`.
 //! - CSV and other tables (`data::io::table`): a line that names the columns, in any order and perhaps with units;
 //!   rules of dashes or units below it, as in an `.rdb`; rows with commas, semicolons, tabs or blanks.
 //!
-//! Comments and titles before the rows are passed over, and so may be any of these lines. A fourth column without a
+//! Comments and titles before the rows are skipped, and any of these lines may be absent. A fourth column without a
 //! name is a flag.
 
 use super::names::{self, Columns};
 use super::row::{Fault, fault, shown};
 use crate::data::io::table::{Line, Lines, Separator, add_units, all_readings, is_below_names, number, readings};
 
-/// How many rows a line before them announces.
+/// The number of rows announced by a line before them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Announced {
-    /// The line that does.
+    /// That line.
     pub line: usize,
     pub points: usize,
     /// Mean profiles in the file.
@@ -40,7 +40,7 @@ pub(super) struct Layout {
 const USUAL: [usize; 4] = [3, 4, 7, 9];
 
 impl Layout {
-    /// Of the lines of a file, and of the comments at its beginning.
+    /// The layout from the lines of a file and the comments at its beginning.
     pub fn of(Lines { lines, comments }: &Lines) -> Result<Self, Fault> {
         let (mut at, mut announced, mut count, mut named) = (0, None, None, None);
         while let Some(Line { number: line, text }) = lines.get(at).copied() {
@@ -62,7 +62,7 @@ impl Layout {
             if !counts_follow && !is_title(text) {
                 break;
             }
-            // what is below the names, dashes or units, names nothing
+            // the line below the names, dashes or units, has no names
             let below = named.is_some_and(|names| is_named(names) && is_below_names(&cells(text)));
             if !below {
                 named = Some(Line { number: line, text });
@@ -86,8 +86,8 @@ fn cells(line: &str) -> Vec<&str> {
     Separator::of(None, std::iter::once(line)).cells(line)
 }
 
-/// Whether a row has as many cells as rows without names have. The last of four is a flag only where it may be one: a
-/// whole number, or a word.
+/// Whether a row has as many cells as rows without names have. The last of four is a flag only if it is a whole number
+/// or a word.
 fn is_usual(cells: &[&str]) -> bool {
     USUAL.contains(&cells.len()) && (cells.len() != 4 || !number(cells[3]).is_ok_and(|flag| flag.fract() != 0.0))
 }
@@ -97,8 +97,8 @@ fn is_named(Line { text, .. }: Line) -> bool {
     all_readings(text, 3..=usize::MAX).iter().any(|names| names::columns(names).is_ok())
 }
 
-/// The columns of rows of so many cells by the line that names them: the last title, which must where a mark parts
-/// them, or the last comment. Units may stand `below`.
+/// The columns of rows with this many cells from the line that names them: the last title, which must name them where
+/// cells have separators, or the last comment. Units may be in the line `below`.
 fn names_before(
     title: Option<Line>,
     below: Option<&Line>,
@@ -112,7 +112,7 @@ fn names_before(
     let Some(Line { number: line, text }) = title else { return Ok(by_comment()) };
     let mut all = readings(text, count);
     if all.is_empty() {
-        // as many as there are, so that it is the row that is at fault
+        // use the existing number, so that the row is reported as the error
         all = readings(text, separator.cells(text).len());
     }
     if let Some(below) = below {

@@ -1,10 +1,10 @@
-//! What a profile is given as: the intensity I in units of the continuum, or what the line takes from it, `1 - I` (as
-//! LSD solves for it) or `I - 1`. It is told by the continuum at both ends, which is near 1 or near 0, and by the sign
-//! of the line.
+//! The quantity in a profile: the intensity I in units of the continuum, or the depth of the line, `1 - I` (as LSD
+//! solves for it) or `I - 1`. It is recognised by the continuum at both ends, which is near 1 or near 0, and by the
+//! sign of the line.
 
 use std::ops::Range;
 
-/// What the column of intensities holds.
+/// The quantity in the column of intensities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Given {
     /// I.
@@ -15,15 +15,15 @@ pub(super) enum Given {
     Excess,
 }
 
-/// A continuum within this of 0 is no continuum of I.
+/// A continuum within this of 0 is not that of I.
 const NEAR_ZERO: f64 = 0.2;
 
-/// Share of the bins at either end that are taken for continuum, and of those that a running mean is over.
+/// Share of the bins at either end that count as continuum, and the width of a running mean.
 const ENDS: f64 = 0.1;
 const SMOOTHED: f64 = 0.05;
 
-/// What is on the other side of the continuum, over the line, is noise or blends below this, and a Stokes V or a null
-/// above.
+/// The signal on the opposite side of the continuum over that of the line: below this it is noise or blends, above this
+/// the profile is a Stokes V or a null.
 const ONE_SIDED: f64 = 0.5;
 
 /// Which of these numbers are data: those between zeros, and numbers below, that fill the ends of a profile of I. A
@@ -52,7 +52,7 @@ pub(super) fn at_the_ends(numbers: &[f64]) -> f64 {
     0.5 * (ends[(ends.len() - 1) / 2] + ends[ends.len() / 2])
 }
 
-/// What a profile of these numbers is given as.
+/// The quantity given by these numbers.
 ///
 /// # Errors
 /// A continuum at 0 with as much above as below it.
@@ -87,7 +87,7 @@ impl Given {
         }
     }
 
-    /// What to say of it.
+    /// The remark on it.
     pub fn remark(self) -> &'static str {
         match self {
             Given::Intensity => "given as I",

@@ -1,6 +1,6 @@
-//! The list of profiles: `FILE TIME_DAYS [VRAD_KMS]` a line, between blanks, tabs, commas or semicolons; a file whose
-//! name holds blanks stands in quotes. A first line may name the columns, among them that of exposure times, for which
-//! a comment that names them does as well.
+//! The list of profiles: one line `FILE TIME_DAYS [VRAD_KMS]` per profile, separated by blanks, tabs, commas or
+//! semicolons; file names with blanks are quoted. A first line may name the columns, including exposure times; so may a
+//! comment.
 
 use super::error::LsdError;
 use super::row::shown;
@@ -9,12 +9,12 @@ use crate::data::io::table::{self, Separator, number};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// What a list says of a profile beside its time.
+/// The entry of a profile in a list, without its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Label {
     /// Its file, as the list names it.
     pub file: String,
-    /// Where that is; `None` for profiles that are in no file.
+    /// Its path; `None` for profiles from memory.
     pub path: Option<PathBuf>,
     /// Velocity that is subtracted from its axis (km/s).
     pub vrad_kms: f64,
@@ -57,10 +57,10 @@ const NAMES: [&[&str]; 4] = [
     &["exposures", "exposure", "exposuretime", "exposuretimes", "exptime", "exptimes", "texp", "texps"],
 ];
 
-/// Where in a line the file, the time, the velocity and the exposure time stand.
+/// Positions of file, time, velocity and exposure time in a line.
 type Places = [usize; 4];
 
-/// Where they stand in a line whose columns have no names: four are too many.
+/// Positions in a line without names of columns: four are too many.
 const UNNAMED: Places = [0, 1, 2, usize::MAX];
 
 /// The lines of a list of that content.
@@ -92,8 +92,8 @@ pub(super) fn parse_list(list: &Path, bytes: &[u8]) -> Result<Vec<Entry>, LsdErr
 
 const SEPARATORS: [Separator; 4] = [Separator::Blanks, Separator::Tab, Separator::Comma, Separator::Semicolon];
 
-/// The places of the columns, if a line names them; if a comment does, it is names and nothing else, that of exposure
-/// times among them: comments above other lists are none.
+/// The positions of the columns, if a line names them. A comment counts only if it consists of names, including that of
+/// exposure times.
 fn named(line: &str, is_comment: bool) -> Option<Places> {
     const MOST: usize = 12;
     table::all_readings(line, 2..=MOST).iter().find_map(|columns| {
@@ -111,7 +111,7 @@ fn named(line: &str, is_comment: bool) -> Option<Places> {
     })
 }
 
-/// What a line says.
+/// The entry in a line.
 struct Row<'a> {
     file: &'a str,
     time_d: f64,
@@ -119,14 +119,14 @@ struct Row<'a> {
     exposure_s: Option<f64>,
 }
 
-/// What a line says, by the first separator that makes sense of it.
+/// The entry in a line, by the first separator that gives a valid one.
 fn read(line: &str, places: Option<Places>) -> Result<Row<'_>, String> {
     let blanks = entry(&Separator::Blanks.cells(line), places);
     let is_quoted = line.contains(['"', '\'']);
     let by_a_mark = || {
         let others = SEPARATORS.into_iter().skip(1).filter_map(|separator| {
             let row = entry(&separator.cells(line), places).ok()?;
-            // a comma within a number is no separator
+            // a comma within a number is not a separator
             let is_file = separator == Separator::Tab || is_quoted || !row.file.contains(char::is_whitespace);
             is_file.then_some(row)
         });

@@ -2,10 +2,10 @@
 
 use crate::data::io::table::Name;
 
-/// Where in a row the numbers that are used stand.
+/// Positions of the used numbers in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Columns {
-    /// How many there are.
+    /// Number of columns.
     pub count: usize,
     pub velocity: usize,
     pub intensity: usize,
@@ -21,10 +21,10 @@ impl Columns {
     }
 }
 
-/// A column with the names that it goes by, bare. The first is the one to use.
+/// A column with its accepted names, bare. The first is preferred.
 type Names = (&'static str, &'static [&'static str]);
 
-/// Those at the beginning count where others are there as well: `V` may be Stokes V.
+/// In order of preference: `V` may be Stokes V.
 const VELOCITY: Names = (
     "velocity",
     &[
@@ -106,7 +106,7 @@ const BEHIND: [&str; 6] = ["kms1", "km/s", "kms", "ms1", "m/s", "ms"];
 /// The columns of a line of names.
 ///
 /// # Errors
-/// Names that are not those of velocity, intensity and sigma, once each; a velocity in another unit.
+/// Names that do not include velocity, intensity and sigma, once each; a velocity in another unit.
 pub(super) fn columns(names: &[Name]) -> Result<Columns, String> {
     let read: Vec<(String, String)> = names.iter().map(name_and_unit).collect();
     let places = |known: Names| -> Vec<usize> {
@@ -151,7 +151,7 @@ fn is_sigma_of_intensity(name: &str) -> bool {
     SIGMA_OF.iter().flat_map(rest).flatten().any(|rest| INTENSITY.1.contains(&rest))
 }
 
-/// Those of the places that have the first of the known names that is there.
+/// The positions with the first of the known names that occurs.
 fn best(read: &[(String, String)], (_, known): Names, places: &[usize]) -> Vec<usize> {
     let with = |name: &&str| -> Vec<usize> { places.iter().copied().filter(|place| read[*place].0 == *name).collect() };
     known.iter().map(with).find(|places| !places.is_empty()).unwrap_or_default()

@@ -1,8 +1,8 @@
-//! A row of a profile, and what can be wrong with a line.
+//! A row of a profile, and errors of a line.
 
 pub(super) use crate::data::io::table::shown;
 
-/// What is used of a row.
+/// The used values of a row.
 pub(super) struct Row {
     pub line: usize,
     pub velocity: f64,
@@ -10,9 +10,9 @@ pub(super) struct Row {
     pub sigma: f64,
     /// How finely the velocity is printed.
     pub digits: Digits,
-    /// What the column of flags says of it, where there is one.
+    /// Its flag, where there is a column of flags.
     pub flag: Option<String>,
-    /// Why the bin holds nothing that can be used, if it does not.
+    /// Why the bin is unusable, if it is.
     pub bad: Option<String>,
 }
 
@@ -26,7 +26,7 @@ pub(super) struct Digits {
 }
 
 impl Digits {
-    /// Those of a number as it stands in its file.
+    /// The digits of a number as written in its file.
     pub fn of(cell: &str) -> Self {
         let (mantissa, exponent) = cell.split_once(['e', 'E', 'd', 'D']).unwrap_or((cell, "0"));
         let exponent = exponent.parse().map_or(0, |exponent: i32| exponent.clamp(-999, 999));
@@ -37,7 +37,7 @@ impl Digits {
     }
 }
 
-/// What is wrong with a line (counted from 1), or with the file as a whole (line 0).
+/// The error of a line (counted from 1), or with the file as a whole (line 0).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fault {
     pub line: usize,

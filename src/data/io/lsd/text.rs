@@ -1,5 +1,5 @@
-//! The text of one profile: what stands before its rows (`layout`), then rows of velocity (km/s), I and its sigma, and
-//! others that are not used. What is given as `1 - I` or `I - 1` becomes I (`level`).
+//! The text of one profile: the lines before its rows (`layout`), then rows of velocity (km/s), I and its sigma, and
+//! unused columns. A profile given as `1 - I` or `I - 1` becomes I (`level`).
 
 use super::axis::Axis;
 use super::layout::{Announced, Layout, wrong_count};
@@ -10,22 +10,22 @@ use crate::data::io::table::{Line, Lines, Separator, has_decimal_comma, number};
 use crate::numerics::quantile::middle;
 use std::ops::Range;
 
-/// A profile as it stands in its file, on a uniform velocity axis.
+/// A profile as in its file, on a uniform velocity axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RawProfile {
     pub axis: Axis,
-    /// I, whatever the file holds.
+    /// I, whatever the file contains.
     pub intensity: Vec<f64>,
     pub sigma: Vec<f64>,
-    /// What the file holds instead.
+    /// The quantity in the file instead.
     pub given: Given,
     /// Mean profiles in the file, of which this is the first.
     pub profiles: usize,
     /// Whether a column of flags marks some of the bins.
     pub is_flagged: bool,
-    /// The bins that hold nothing that can be used.
+    /// The unusable bins.
     bad: Vec<(usize, Fault)>,
-    /// What is left between ends that weigh nothing, their errors being out of all proportion.
+    /// The range between ends without weight, where uncertainties are extremely large.
     weighty: Range<usize>,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct RawProfile {
 const SMALLEST_SIGMA: f64 = 1e-9;
 const LARGEST: f64 = 1e6;
 
-/// Errors larger than the usual one by this mark the ends of a profile as no data.
+/// Uncertainties larger than the median one by this factor mark the ends of a profile as no data.
 const WEIGHTLESS: f64 = 100.0;
 
 /// Fewest bins that make a profile.
@@ -120,7 +120,7 @@ pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
     Ok(profile)
 }
 
-/// Why no line is a row.
+/// The error where no line is a row.
 fn no_row(lines: &Lines, line: usize, text: &str) -> Result<RawProfile, Fault> {
     let commas = lines.lines.iter().find_map(|line| {
         let by = [Separator::Blanks, Separator::Semicolon].map(|separator| separator.cells(line.text));
@@ -133,7 +133,7 @@ fn no_row(lines: &Lines, line: usize, text: &str) -> Result<RawProfile, Fault> {
     }
 }
 
-/// The rows of the first profile, as many as are announced; those at its ends that say no velocity are left out.
+/// The rows of the first profile, as many as announced; those at its ends without a velocity are left out.
 fn rows(lines: &[Line], layout: &Layout) -> Result<Vec<Row>, Fault> {
     let mut rows: Vec<Row> = Vec::new();
     for line in lines {
@@ -166,7 +166,7 @@ fn parse_row(line: usize, cells: &[&str], layout: &Layout) -> Result<Row, Fault>
     }
     let read = |cell: &str| number(cell).or_else(|problem| fault(line, problem));
     if layout.separator == Separator::Blanks {
-        // what is not used need only be numbers
+        // unused cells need only be numbers
         let unused = cells.iter().enumerate().filter(|(column, _)| columns.flag != Some(*column));
         unused.into_iter().try_for_each(|(_, cell)| read(cell).map(drop))?;
     }

@@ -1,35 +1,35 @@
-//! Whether the times of a list are days from one zero point, one for each of several profiles.
+//! Whether the times of a list are days in one time system, one for each of several profiles.
 
 use super::list::Entry;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Times of this size are not days, and velocities of that size (km/s) are no star's.
+/// Times of this size are not days, and velocities of that size (km/s) do not occur in stars.
 const BEYOND_SENSE_D: f64 = 1e9;
 const BEYOND_SENSE_KMS: f64 = 1e4;
 
-/// Zero point of the Modified Julian Date, as a Julian date.
+/// Origin of the Modified Julian Date, as a Julian date.
 const MJD_ZERO_D: f64 = 2_400_000.5;
 
-/// Julian dates within this of that are of our time.
+/// Julian dates within this of that are plausible.
 const OUR_TIME_D: f64 = 200_000.0;
 
 /// Longer than profiles like these have been observed (d): 50 years.
 pub const LONGEST_D: f64 = 18_262.5;
 
-/// Nobody observes a rotating star with at least this between any two of its profiles (d).
+/// No rotating star is observed with at least this between any two of its profiles (d).
 const SPARSEST_D: f64 = 100.0;
 
-/// A gap of this share of the whole span has another zero point beyond it.
+/// A gap of this share of the whole span indicates another time system beyond it.
 const GAP: f64 = 0.9;
 
 const DAYS_PER_YEAR: f64 = 365.25;
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
-/// What is wrong with a list, and in which line.
+/// The error of a list, with its line.
 pub(super) type Fault = (usize, String);
 
-/// Checks times and velocities, that there are `fewest` at least, and that no file stands there twice.
+/// Checks times and velocities, that there are at least `fewest`, and that no file is listed twice.
 ///
 /// # Errors
 /// The first line at fault, with the likely cure.
@@ -58,7 +58,7 @@ fn of_sense(entry: &Entry) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Of entries by time: no Julian dates beside others, no jump as long as a life.
+/// Checks entries sorted by time: no Julian dates mixed with others, no jump of decades.
 fn one_zero_point(sorted: &[&Entry]) -> Result<(), Fault> {
     let Some(k) = (1..sorted.len()).max_by(|a, b| gap(sorted, *a).total_cmp(&gap(sorted, *b))) else { return Ok(()) };
     let (first, last) = (sorted[0].time_d, sorted[sorted.len() - 1].time_d);
@@ -88,7 +88,7 @@ fn gap(sorted: &[&Entry], k: usize) -> f64 {
     sorted[k].time_d - sorted[k - 1].time_d
 }
 
-/// Of entries by time: neither too long nor too sparse for days.
+/// Checks entries sorted by time: neither too long nor too sparse for days.
 fn in_days(sorted: &[&Entry]) -> Result<(), Fault> {
     let gaps = (1..sorted.len()).map(|k| gap(sorted, k));
     let (sum, least) = (gaps.clone().sum::<f64>(), gaps.filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min));
@@ -108,7 +108,7 @@ fn in_days(sorted: &[&Entry]) -> Result<(), Fault> {
 fn no_file_twice(entries: &[Entry]) -> Result<(), Fault> {
     let mut seen: HashMap<PathBuf, usize> = HashMap::new();
     for entry in entries {
-        // one that cannot be found is told of by who reads it
+        // a missing file is reported by its reader
         let path = std::fs::canonicalize(&entry.path).unwrap_or_else(|_| entry.path.clone());
         if let Some(line) = seen.insert(path, entry.line) {
             return Err((
@@ -123,7 +123,7 @@ fn no_file_twice(entries: &[Entry]) -> Result<(), Fault> {
 fn no_time_twice(entries: &[Entry]) -> Result<(), Fault> {
     let mut seen: HashMap<u64, &Entry> = HashMap::new();
     for entry in entries {
-        // 0 and -0 are one time
+        // 0 and -0 are the same time
         if let Some(Entry { line, file, time_d, .. }) = seen.insert((entry.time_d + 0.0).to_bits(), entry) {
             let problem = format!(
                 "{} has the time {time_d} of {file} in line {line}: is it the same profile? leave one out, or give \

@@ -1,29 +1,29 @@
-//! Wild bins: those that stand out of their neighbours, as no line does that is seen in bins of this width, by far more
-//! than the same bin does in other profiles. A cosmic ray makes them, and no map fits one.
+//! Outlying bins: those that deviate from their neighbours more than any line does in bins of this width, and by far
+//! more than the same bin of other profiles. Cosmic rays cause them, and no map fits them.
 
 use crate::numerics::quantile::quantile;
 use crate::star::observation::Profile;
 
-/// A bin is wild that is away by so many errors and by so many times what others of its profile, and the same bin of
-/// other profiles, are.
+/// A bin is outlying if it deviates by this many standard errors, and by this many times the deviations of others of
+/// its profile and of the same bin in other profiles.
 const FAR: f64 = 15.0;
 
-/// Weights of four neighbours that a cubic through them has in the middle.
+/// Weights of four neighbours in the cubic interpolation at the middle.
 const CUBIC: [(isize, f64); 4] = [(-2, -1.0 / 6.0), (-1, 2.0 / 3.0), (1, 2.0 / 3.0), (2, -1.0 / 6.0)];
 
-/// Fewest profiles that tell what is usual.
+/// Fewest profiles for the typical deviation.
 const FEWEST: usize = 3;
 
-/// The wildest bin of a profile.
+/// The most outlying bin of a profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Wild {
     pub profile: usize,
     pub bin: usize,
-    /// How many errors it is away from its neighbours.
+    /// Its deviation from its neighbours in standard errors.
     pub errors: f64,
 }
 
-/// The wildest bin of each profile that has wild ones.
+/// The most outlying bin of each profile that has some.
 pub(super) fn bins(profiles: &[Profile]) -> Vec<Wild> {
     let Some(reference) = profiles.first().filter(|_| profiles.len() >= FEWEST) else { return Vec::new() };
     let place = |p: &Profile| ((p.first_velocity_kms - reference.first_velocity_kms) / p.step_kms).round() as isize;
@@ -45,7 +45,7 @@ pub(super) fn bins(profiles: &[Profile]) -> Vec<Wild> {
         let of_profile = median(from_usual.clone());
         let size = |j: &usize| from_usual[*j] / profile.sigma[*j].max(of_profile).max(usual[*j].1);
         let wild = (0..of.len()).filter(|j| size(j) > FAR);
-        // its neighbours stand out as well, by less
+        // its neighbours deviate as well, by less
         if let Some(bin) = wild.max_by(|a, b| from_usual[*a].total_cmp(&from_usual[*b])) {
             found.push(Wild { profile: k, bin, errors: from_usual[bin] / profile.sigma[bin] });
         }
@@ -58,7 +58,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     quantile(&values, 0.5)
 }
 
-/// How far each bin is away from the cubic through its neighbours; 0 where there are not enough.
+/// Deviation of each bin from the cubic through its neighbours; 0 where there are not enough.
 fn away(profile: &Profile) -> Vec<f64> {
     let at = |j: usize, by: isize| Some(*profile.intensity.get(j.checked_add_signed(by)?)?);
     let cubic = |j: usize| CUBIC.iter().map(|(by, weight)| Some(weight * at(j, *by)?)).sum::<Option<f64>>();

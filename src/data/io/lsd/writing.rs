@@ -17,9 +17,9 @@ pub fn is_written(name: &str) -> bool {
 }
 
 /// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The
-/// list comes last, so that where it is the profiles are; files of these names are replaced.
+/// list is written last, so that its presence implies that of the profiles; files of these names are replaced.
 ///
-/// Times are exact, intensities good to 5e-13. Profiles that do not share one velocity axis can be written, but not
+/// Times are exact, intensities accurate to 5e-13. Profiles that do not share one velocity axis can be written, but not
 /// read back.
 ///
 /// # Errors
@@ -41,7 +41,7 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), WriteErro
     save(&folder.join(LIST), &list)
 }
 
-/// The same for profiles of whatever origin that were at hand as numbers.
+/// The same for profiles from memory, of any origin.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -51,8 +51,8 @@ pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), L
     Ok(write_as(folder, observations, &labels, "from arrays")?)
 }
 
-/// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity
-/// axis, and a comment names the file that a profile comes from. `what` says in its title what became of it.
+/// The same for modified observed profiles, with one of the `labels` each: VRAD stays in the list and in the velocity
+/// axis, and a comment names the original file. `what` describes the modification in the title.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -70,7 +70,7 @@ pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], wh
     save(&folder.join(LIST), &list)
 }
 
-/// The last column of a line, where the exposure is known.
+/// The last column of a line, where the exposure time is known.
 fn exposure(profile: &Profile) -> String {
     profile.exposure_s.map_or(String::new(), |exposure_s| format!(" {exposure_s}"))
 }

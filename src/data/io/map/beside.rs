@@ -1,5 +1,5 @@
-//! `lightcurve.csv` and `indicators.csv`: light curves and activity indicators, and what the most probable maps make of
-//! them.
+//! `lightcurve.csv` and `indicators.csv`: light curves and activity indicators, and their prediction by the most
+//! probable maps.
 
 use crate::data::io::csv::Table;
 use crate::surface::{FluxFit, ReadingFit, SurfaceMaps};
@@ -7,10 +7,10 @@ use crate::surface::{FluxFit, ReadingFit, SurfaceMaps};
 /// Name of the file, which is there where there are light curves.
 pub const LIGHT_CURVES: &str = "lightcurve.csv";
 
-/// Name of the file, which is there where there are indicators that count.
+/// Name of the file, which is there where there are indicators in use.
 pub const INDICATORS: &str = "indicators.csv";
 
-/// The tables of what these maps have beside profiles, with the names of their files.
+/// The tables of data other than profiles for these maps, with the names of their files.
 pub fn tables(maps: &SurfaceMaps) -> Vec<(&'static str, Table)> {
     let light = (LIGHT_CURVES, light_curves as fn(&SurfaceMaps) -> Table, maps.light.len());
     let all = [light, (INDICATORS, indicators, maps.readings.len())];

@@ -7,7 +7,7 @@ use super::number::has_decimal_comma;
 pub enum Separator {
     /// Blanks and tabs, as many as there are.
     Blanks,
-    /// One tab: cells may be empty, and hold blanks.
+    /// One tab: cells may be empty or contain blanks.
     Tab,
     /// A comma.
     Comma,
@@ -16,8 +16,8 @@ pub enum Separator {
 }
 
 impl Separator {
-    /// That of rows, by the first of them; `names` is the line of names above them, if there is one. Tabs are blanks
-    /// where all lines have as many cells then.
+    /// The separator of rows, from the first of them; `names` is the line of names above them, if there is one. Tabs
+    /// count as blanks where all lines then have equal numbers of cells.
     pub fn of<'a>(names: Option<&str>, mut rows: impl Iterator<Item = &'a str> + Clone) -> Self {
         let first = rows.clone().next().unwrap_or_default();
         if first.contains(';') {
@@ -30,7 +30,7 @@ impl Separator {
         }
         let even = |line: &str| Separator::Blanks.cells(line).len() == by_blanks.len();
         let by_tabs = |line: &str| Separator::Tab.cells(line).len();
-        // a title is no line of names
+        // a title is not a line of names
         let is_of_tabs = |names: &str| !even(names) && by_tabs(names) == by_tabs(first);
         match first.contains('\t') && (!rows.all(even) || names.is_some_and(is_of_tabs)) {
             true => Separator::Tab,
@@ -38,8 +38,8 @@ impl Separator {
         }
     }
 
-    /// The cells of a line, without the quotes around them; one separator at the end is none too many, and between
-    /// blanks what follows a `#` is a comment.
+    /// The cells of a line, without the quotes around them; one separator at the end is allowed, and in lines separated
+    /// by blanks a `#` starts a comment.
     pub fn cells(self, line: &str) -> Vec<&str> {
         let mark = match self {
             Separator::Blanks => return words(line),
@@ -58,7 +58,7 @@ impl Separator {
 
 const QUOTES: [char; 2] = ['"', '\''];
 
-/// A line parted by a mark that is not within double quotes.
+/// A line split at separators outside of double quotes.
 fn parts(line: &str, mark: char) -> impl Iterator<Item = &str> {
     let mut within = false;
     line.split(move |c: char| {

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// What a file is that is no text.
+/// The format of a file that is not text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotText {
     /// FITS.
@@ -11,11 +11,11 @@ pub enum NotText {
     Numpy,
     /// Packed by gzip, bzip2 or xz.
     Compressed,
-    /// A zip archive, as which spreadsheets and several NumPy arrays are written.
+    /// A zip archive: spreadsheets, and several NumPy arrays.
     Zip,
     /// HDF5.
     Hdf5,
-    /// XML, as which VOTables are written.
+    /// XML, such as VOTables.
     Xml,
     /// Anything else.
     Binary,
@@ -35,7 +35,7 @@ impl std::fmt::Display for NotText {
     }
 }
 
-/// How files that are no text begin.
+/// First bytes of files that are not text.
 const BEGINNINGS: [(&[u8], NotText); 9] = [
     (b"SIMPLE  =", NotText::Fits),
     (b"\x93NUMPY", NotText::Numpy),
@@ -48,14 +48,14 @@ const BEGINNINGS: [(&[u8], NotText); 9] = [
     (b"<VOTABLE", NotText::Xml),
 ];
 
-/// The mark that some editors put before a text, and other characters that nobody sees.
+/// The byte-order mark of some editors, and other invisible characters.
 const UNSEEN: [char; 2] = ['\u{feff}', '\u{200b}'];
 
-/// The text of a file: UTF-8, or UTF-16 after its mark; lines end in `\n`, whatever they end in there. Marks and
-/// characters without width are left out; bytes that are no UTF-8 are replaced, which does no harm in comments.
+/// The text of a file: UTF-8, or UTF-16 after its mark; line ends become `\n`. Marks and zero-width characters are left
+/// out; invalid UTF-8 is replaced, which is harmless in comments.
 ///
 /// # Errors
-/// A file that is no text.
+/// A file that is not text.
 pub fn text(bytes: &[u8]) -> Result<Cow<'_, str>, NotText> {
     if let Some((_, what)) = BEGINNINGS.iter().find(|(beginning, _)| bytes.starts_with(beginning)) {
         return Err(*what);

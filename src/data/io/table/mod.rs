@@ -1,7 +1,7 @@
-//! Tables of numbers as other programs write them: the text of a file in whatever encoding ([`text`]), lines without
-//! comments, cells between commas, semicolons, tabs or blanks ([`Separator`]), names of columns with their units
-//! ([`Name`]), and numbers ([`number()`]). LSD profiles, lists of them and light curves are read by it; what columns
-//! mean, and which rows are wanted, is theirs to say.
+//! Tables of numbers in the formats of other programs: the text of a file in whatever encoding ([`text`]), lines
+//! without comments, cells between commas, semicolons, tabs or blanks ([`Separator`]), names of columns with their
+//! units ([`Name`]), and numbers ([`number()`]). The readers of LSD profiles, lists of them and light curves use it;
+//! they decide on the meaning of columns and the choice of rows.
 
 mod cells;
 mod encoding;
@@ -24,21 +24,21 @@ const FEWEST: usize = 2;
 pub struct Line<'a> {
     /// Its number, from 1.
     pub number: usize,
-    /// What it holds.
+    /// Its content.
     pub text: &'a str,
 }
 
 /// The lines of a text, and the comments before the first of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lines<'a> {
-    /// What is neither blank nor a comment.
+    /// Lines that are neither blank nor comments.
     pub lines: Vec<Line<'a>>,
     /// Comments before all of these, without their marks.
     pub comments: Vec<&'a str>,
 }
 
 impl<'a> Lines<'a> {
-    /// Of a text.
+    /// The lines of a text.
     pub fn of(text: &'a str) -> Self {
         let filled = text.lines().enumerate().map(|(k, text)| Line { number: k + 1, text });
         let filled = filled.filter(|line| !line.text.trim().is_empty());
@@ -54,7 +54,7 @@ impl<'a> Lines<'a> {
 pub struct Row<'a> {
     /// Its line, from 1.
     pub line: usize,
-    /// What stands in it, as text.
+    /// Its cells, as text.
     pub cells: Vec<&'a str>,
 }
 
@@ -65,11 +65,11 @@ impl<'a> Row<'a> {
     }
 }
 
-/// A table as it stands in its file. Rows need not have as many cells as others.
+/// A table as in its file. Rows need not have as many cells as others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table<'a> {
     /// The ways to read the names of the columns, the plain one first: of the last line before the rows, or of the last
-    /// comment. Empty where there are none for as many columns as the first row has.
+    /// comment. Empty where there are none for the number of columns of the first row.
     pub names: Vec<Vec<Name>>,
     /// The rows, from the first that holds two numbers or more.
     pub rows: Vec<Row<'a>>,
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// A piece of the user's text, quoted, escaped and cut to a length that keeps a message on one line.
+/// A piece of text of the user, quoted, escaped and cut to a length that keeps a message on one line.
 pub fn shown(text: &str) -> String {
     let short: String = text.chars().take(40).collect();
     format!("{short:?}")

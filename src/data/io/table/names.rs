@@ -7,9 +7,9 @@ use std::ops::RangeInclusive;
 /// The name of a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Name {
-    /// As it is written.
+    /// As written.
     pub written: String,
-    /// Lower case, letters, digits and `/` alone, without the unit: what synonyms are looked up by.
+    /// Lower case, letters, digits and `/` alone, without the unit: the key for synonyms.
     pub bare: String,
     /// The unit in brackets after it or in the line below, bare as well; empty where there is none.
     pub unit: String,
@@ -31,8 +31,8 @@ pub fn bare(text: &str) -> String {
     text.chars().filter(|c| c.is_alphanumeric() || *c == '/').flat_map(char::to_lowercase).collect()
 }
 
-/// The ways to read a line as the names of so many columns, the plain ones first: words by any separator, words in
-/// brackets being units of the one before, or words that two blanks part.
+/// Possible readings of a text line as the names of this many columns, the plain ones first: words by any separator,
+/// words with units in brackets after them, or words separated by two blanks.
 pub fn readings(line: &str, columns: usize) -> Vec<Vec<Name>> {
     all_readings(line, columns..=columns)
 }
@@ -56,7 +56,7 @@ pub fn all_readings(line: &str, columns: RangeInclusive<usize>) -> Vec<Vec<Name>
     all
 }
 
-/// Words, what is in brackets being part of the word before it.
+/// Words, brackets being part of the word before them.
 fn with_units(words: &[String]) -> Vec<String> {
     let (mut joined, mut depth): (Vec<String>, i32) = (Vec::new(), 0);
     for word in words {
@@ -69,7 +69,7 @@ fn with_units(words: &[String]) -> Vec<String> {
     joined
 }
 
-/// Whether the cells of a line below the names say what columns are, and not what they hold: dashes, units, types.
+/// Whether the cells of a line below the names describe columns (dashes, units, types) and are not data.
 pub fn is_below_names(cells: &[&str]) -> bool {
     let is_value = |cell: &&str| !is_dashes(cell) && !cell.is_empty() && number(cell).is_ok();
     !cells.is_empty() && !cells.iter().any(is_value)

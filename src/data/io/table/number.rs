@@ -1,19 +1,19 @@
-//! One number, as other programs print it.
+//! One number, in the formats of other programs.
 
 use super::shown;
 use std::borrow::Cow;
 
-/// What stands for a minus where a text was set for print: minus, en dash, full-width minus.
+/// Typographic minus signs: minus, en dash, full-width minus.
 const MINUS: [char; 3] = ['\u{2212}', '\u{2013}', '\u{ff0d}'];
 
-/// What stands where there is no number, in lower case.
+/// Markers of missing numbers, in lower case.
 const MISSING: [&str; 8] = ["", "null", "none", "na", "n/a", "masked", "missing", "blank"];
 
-/// The number in a cell; NaN where the cell says that there is none (it is empty, `--`, `null`, ... or the `***` of
+/// The number in a cell; NaN for a marker of a missing number (an empty cell, `--`, `null`, ... or the `***` of
 /// Fortran). Exponents may be Fortran's (`1.5D+01`), and a minus that of print (U+2212).
 ///
 /// # Errors
-/// What is no number, quoted; a decimal comma is named.
+/// Text that is not a number, quoted; a decimal comma is named.
 pub fn number(cell: &str) -> Result<f64, String> {
     let cell = cell.trim();
     if let Ok(number) = cell.parse() {
@@ -35,7 +35,7 @@ pub fn number(cell: &str) -> Result<f64, String> {
     })
 }
 
-/// Whether a cell says that there is no number.
+/// Whether a cell is a marker of a missing number.
 pub fn is_missing(cell: &str) -> bool {
     is_dashes(cell) || cell.bytes().all(|b| b == b'*') || MISSING.contains(&cell.to_lowercase().as_str())
 }
@@ -45,7 +45,7 @@ pub fn is_dashes(cell: &str) -> bool {
     !cell.is_empty() && cell.bytes().all(|b| b == b'-')
 }
 
-/// Whether a cell reads as a number once its comma is a point.
+/// Whether a cell reads as a number with its comma replaced by a point.
 pub fn has_decimal_comma(cell: &str) -> bool {
     let is_number = |text: &str| {
         let text = text.replace(MINUS, "-").replacen(['D', 'd'], "e", 1);

@@ -1,6 +1,6 @@
 //! ZDIpy's model of the local line, `model-voigt-line.dat`: wavelength (nm), central depth, Gaussian width (km/s,
 //! sqrt(2) standard deviations), Lorentzian half width (over the Gaussian one), Lande factor, limb darkening (linear),
-//! and perhaps gravity darkening. It describes one line; others that follow are not used, there neither.
+//! and perhaps gravity darkening. It describes one line; later ones are not used, as in ZDIpy.
 
 use super::read_text;
 use super::rows::Rows;
@@ -16,7 +16,7 @@ pub const LINE_FILE: &str = "model-voigt-line.dat";
 pub struct LocalLineFile {
     /// The file.
     pub path: PathBuf,
-    /// The line that holds it all.
+    /// The line with these values.
     pub line: usize,
     /// Wavelength (nm).
     pub wavelength_nm: f64,

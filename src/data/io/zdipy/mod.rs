@@ -1,9 +1,9 @@
 //! Input files of ZDIpy (Folsom et al. 2018, MNRAS 474, 4956; <https://github.com/folsomcp/ZDIpy>): `inzdi.dat`, and
 //! the model of the local line beside it (`line`).
 //!
-//! Lines that begin with `#` and blank ones are comments; values stand in a fixed order, one group a line, and what
-//! follows them on a line is ignored. Older versions have no line for mass and radius. Units and signs are those of
-//! this program: degrees, km/s, days, rad/d (equator minus pole); velocities are subtracted from the observed axis;
+//! Lines that begin with `#` and blank ones are comments; values are in a fixed order, one group per line, and text
+//! after them on a line is ignored. Older versions have no line for mass and radius. Units and signs are those of this
+//! program: degrees, km/s, days, rad/d (equator minus pole); velocities are subtracted from the observed axis;
 //! longitudes increase in the sense of rotation, so that those smaller than 0 come into view as cycles grow.
 
 mod line;
@@ -15,7 +15,7 @@ use crate::data::io::FileError;
 use rows::{Row, Rows};
 use std::path::{Path, PathBuf};
 
-/// A value and the line (from 1) that it stands on.
+/// A value and the line (from 1) of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field<T> {
     /// The value.
@@ -24,7 +24,7 @@ pub struct Field<T> {
     pub line: usize,
 }
 
-/// What the fit ends at.
+/// The target of the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
     /// A chi2 per datum.
@@ -33,7 +33,7 @@ pub enum Target {
     Entropy(f64),
 }
 
-/// How bright a surface element may be.
+/// The allowed brightness of a surface element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BrightnessEntropy {
     /// Brighter or darker than the photosphere.
@@ -72,7 +72,7 @@ pub struct Input {
     pub mass_radius: Option<Field<(f64, f64)>>,
     /// Rings of surface elements.
     pub rings: Field<usize>,
-    /// Where the fit ends.
+    /// The target of the fit.
     pub target: Field<Target>,
     /// Whether the magnetic field is fitted.
     pub magnetic: Field<bool>,
@@ -104,8 +104,7 @@ impl Input {
     /// Reads the file at `path`.
     ///
     /// # Errors
-    /// A file that cannot be read or ends too early, or a line that makes no sense or names a profile that is not
-    /// there.
+    /// A file that cannot be read or ends too early, or a line that is invalid or names a profile that is not there.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let mut rows = Rows::new(path, &text);

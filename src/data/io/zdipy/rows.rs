@@ -1,16 +1,16 @@
-//! Rows of ZDIpy's input files: what is no comment, with line numbers, taken one by one.
+//! Rows of ZDIpy's input files: lines that are not comments, with line numbers, read one by one.
 
 use super::Field;
 use crate::data::io::FileError;
 use std::path::Path;
 
-/// The rows that are left.
+/// The remaining rows.
 pub(super) struct Rows<'a> {
     path: &'a Path,
     lines: std::iter::Enumerate<std::str::Lines<'a>>,
 }
 
-/// A line that is no comment.
+/// A line that is not a comment.
 pub(super) struct Row<'a> {
     path: &'a Path,
     /// Its number (from 1).
@@ -94,7 +94,7 @@ impl<'a> Row<'a> {
 /// No count is larger.
 const MOST: usize = 10_000;
 
-/// A piece of the user's text, quoted and cut to a length that keeps a message on one line.
+/// A piece of text of the user, quoted and cut to a length that keeps a message on one line.
 fn shown(text: &str) -> String {
     format!("{:?}", text.chars().take(40).collect::<String>())
 }

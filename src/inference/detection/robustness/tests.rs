@@ -1,4 +1,4 @@
-//! What depends on nights and targets.
+//! Dependence on nights and targets.
 
 use super::*;
 use crate::model::{Clock, Ephemeris};

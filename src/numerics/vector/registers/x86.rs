@@ -92,7 +92,7 @@ impl Instructions for Avx512 {
     }
 }
 
-/// What differs between sets of registers by the names of their instructions alone.
+/// The parts of sets of registers that differ only in names of instructions.
 macro_rules! arithmetic {
     (
         $count:literal $number:ident in $lanes:ident:

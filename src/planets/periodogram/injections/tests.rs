@@ -1,12 +1,12 @@
-//! Orbits that are put in against searches of velocities that have them.
+//! Injected orbits against searches of velocities that contain them.
 
 use super::super::FrequencySettings;
 use super::super::orbits::velocities;
 use super::super::sample::{self, uneven};
 use super::*;
 
-/// Velocities whose information halves from field to field: an orbit is searched for with the field that suits the
-/// star without a planet best, by its ln L and what the orbit costs, in both closed form.
+/// Velocities whose information halves from field to field: an orbit is searched for with the best field of the star
+/// without a planet, from its ln L and the loss due to the orbit, both in closed form.
 #[test]
 fn an_orbit_is_searched_for_with_the_field_that_absorbs_it() {
     let cycles = uneven(20, 5.0);
@@ -84,7 +84,7 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
     }
 }
 
-/// The fit of spots knows no offsets of nights: they do not change which field is searched with.
+/// The fit of spots has no nightly offsets: they do not change the field of the search.
 #[test]
 fn fields_are_fitted_without_offsets_of_nights() {
     let cycles = uneven(20, 5.0);

@@ -1,4 +1,4 @@
-//! A jitter against the covariance of velocities, and how often chance makes a planet beside it.
+//! A jitter against the covariance of velocities, and its false-alarm probability.
 
 use super::super::sample::{self, uneven};
 use super::super::{Frequencies, FrequencySettings, Search, SearchSettings};
@@ -44,7 +44,7 @@ fn search(n: usize, k_kms: f64, jitter_kms: f64, seed: u64) -> f64 {
     found.false_alarm.probability(found.best().orbit.delta_ln_l).value()
 }
 
-/// Twelve velocities: all of a planet of 0.6 km/s looks like a jitter at first.
+/// Twelve velocities: a planet of 0.6 km/s looks entirely like a jitter without an orbit in the model.
 #[test]
 fn a_strong_planet_does_not_hide_behind_its_own_jitter() {
     let found: Vec<f64> = (0..3).map(|seed| search(12, 0.6, 0.0, seed)).collect();

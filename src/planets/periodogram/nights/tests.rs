@@ -1,4 +1,4 @@
-//! Offsets of nights against the covariance of velocities, and how often chance makes a planet beside them.
+//! Nightly offsets against the covariance of velocities, and the false-alarm probability with them.
 
 use super::super::sample;
 use super::super::{Frequencies, FrequencySettings, Search};
@@ -6,7 +6,7 @@ use super::*;
 
 const ERROR_KMS: f64 = 0.03;
 
-/// Twelve nights of three profiles, seen by themselves.
+/// Twelve nights of three profiles.
 fn of(jitter_kms: f64, night_kms: f64, k_kms: f64, seed: u64) -> (VelocityQuadratic, Nights) {
     let cycles: Vec<f64> = (0..36).map(|k| 0.37 * (k / 3) as f64 + 0.03 * (k % 3) as f64).collect();
     let nights: Vec<Vec<usize>> = (0..12).map(|night| (3 * night..3 * night + 3).collect()).collect();
@@ -19,7 +19,7 @@ fn of(jitter_kms: f64, night_kms: f64, k_kms: f64, seed: u64) -> (VelocityQuadra
     (velocities, Nights::new(36, &nights).unwrap())
 }
 
-/// Beside offsets and a jitter that is all the scatter without a planet; the false-alarm probability of the highest
+/// With offsets and a jitter that explains all of the rms without a planet; the false-alarm probability of the highest
 /// peak, with the offsets.
 fn found(jitter_kms: f64, night_kms: f64, k_kms: f64, seed: u64) -> Option<(f64, Offsets)> {
     let (velocities, nights) = of(jitter_kms, night_kms, k_kms, seed);
@@ -61,7 +61,7 @@ fn the_offsets_add_to_the_covariance() {
     }
 }
 
-/// Stars without a planet are drawn with the offsets found beside the peak: probabilities are uniform or larger.
+/// Stars without a planet are drawn with the offsets found with the peak: probabilities are uniform or larger.
 #[test]
 fn offsets_of_nights_are_no_planet() {
     let found: Vec<(f64, Offsets)> = (0..60).filter_map(|seed| found(0.0, 0.06, 0.0, seed)).collect();
@@ -71,7 +71,7 @@ fn offsets_of_nights_are_no_planet() {
     let distance = all.iter().enumerate().map(below).fold(0.0, f64::max);
     // exceeded once in a hundred by chance: 1.52 / sqrt(60)
     assert!(all.len() > 58 && distance < 0.2 && all[0] > 1e-3 && all[30] < 0.8, "{distance} {all:?}");
-    // no more than 60 m/s count
+    // offsets of at most 60 m/s are allowed
     let sizes = found.iter().map(|found| found.1.sigma_kms.powi(2)).sum::<f64>() / found.len() as f64;
     assert!((0.65..1.05).contains(&(sizes.sqrt() / 0.06)), "{sizes}");
 }
@@ -85,7 +85,7 @@ fn known(night_kms: f64, k_kms: f64, seed: u64) -> Option<NightOffsets> {
     known_beside_offsets(&velocities, &nights, (found_kms, None), &unit, settings)
 }
 
-/// K of such a planet is as improbable as it says.
+/// The false-alarm probability of K of such a planet is calibrated.
 #[test]
 fn offsets_of_nights_are_no_known_planet() {
     let mut all: Vec<f64> = (0..200)
@@ -108,7 +108,7 @@ fn a_known_planet_is_no_offset_of_nights() {
     assert!(all.len() == 6 && all.iter().all(|found| found.false_alarm_probability < 1e-2), "{all:?}");
 }
 
-/// Beside a jitter or none.
+/// With a jitter or none.
 #[test]
 fn a_planet_is_no_offset_of_nights() {
     for jitter_kms in [0.0, 0.06] {
@@ -128,8 +128,8 @@ fn profiles_that_are_left_keep_their_nights() {
     assert_eq!(Nights::new(5, &[vec![0, 1], vec![2], vec![3, 4]]), None);
 }
 
-/// K of a known planet is drawn with the variance of its gradient: nights and errors of unlike size, whose root is not
-/// symmetric.
+/// K of a known planet is drawn with the variance of its gradient: nights and uncertainties of unequal size, whose root
+/// is not symmetric.
 #[test]
 fn amplitudes_have_the_variance_of_the_gradient() {
     let cycles: Vec<f64> = (0..12).map(|k| 0.37 * f64::from(k / 3) + 0.03 * f64::from(k % 3)).collect();
@@ -156,7 +156,7 @@ fn amplitudes_have_the_variance_of_the_gradient() {
     assert!((variance / expected - 1.0).abs() < 0.06, "{variance} {expected}");
 }
 
-/// Without a night the offsets are those of the star, whatever the other nights ask for.
+/// Without a night the offsets are those of the star, whatever the other nights require.
 #[test]
 fn without_a_night_the_offsets_stay() {
     let (mut velocities, nights) = of(0.0, 0.0, 0.0, 7);
@@ -166,7 +166,7 @@ fn without_a_night_the_offsets_stay() {
     let jitter = (0.09, None);
     let (all, Offsets { sigma_kms, .. }) = beside_offsets(&velocities, &nights, jitter, Reach::Stable).unwrap();
     assert!(sigma_kms > 0.03, "{sigma_kms}");
-    // profiles do not depend on each other here
+    // profiles are independent here
     let others = VelocityQuadratic {
         cycles: velocities.cycles[3..].to_vec(),
         gradient: velocities.gradient.rows(3, 33).into_owned(),

@@ -1,9 +1,9 @@
 //! Differential evolution: along the difference of two walkers of the other half.
 //!
-//! Source: ter Braak 2006, equation 2: `Y = X + gamma (X_j - X_k) + e`, `gamma = 2.38 / sqrt(2 d)`, and gamma = 1 now
-//! and then, which leads from one mode to another. Symmetric, so the factor is 1. Here gamma carries a small jitter,
-//! and the noise `e` follows the spread of the other half in each coordinate: with it, the move reaches every place
-//! even when the half has no more walkers than dimensions.
+//! Source: ter Braak 2006, equation 2: `Y = X + gamma (X_j - X_k) + e`, `gamma = 2.38 / sqrt(2 d)`, and occasionally
+//! gamma = 1, which allows jumps between modes. Symmetric, so the factor is 1. Here gamma carries a small jitter, and
+//! the noise `e` follows the spread of the other half in each coordinate: with it, the move reaches every position even
+//! when the half has no more walkers than dimensions.
 
 use crate::sampling::chain::MoveKind;
 use crate::sampling::ensemble::moves::{Move, Proposal};
@@ -15,7 +15,7 @@ use rand_distr::StandardNormal;
 pub struct DifferentialEvolution {
     /// Relative standard deviation of gamma.
     pub jitter: f64,
-    /// Share of proposals with gamma = 1.
+    /// Fraction of proposals with gamma = 1.
     pub hop: f64,
     /// Standard deviation of the noise over that of the other half.
     pub noise: f64,

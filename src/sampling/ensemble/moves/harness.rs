@@ -1,6 +1,6 @@
 //! One test for every move: densities of known moments and quantiles, recovered within Monte Carlo error.
 //!
-//! The error is measured, from the scatter between independent ensembles.
+//! The error is measured by the scatter between independent ensembles.
 
 use crate::sampling::ensemble::{Mix, Positions, Sampler, SamplerSettings};
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status};
@@ -36,7 +36,7 @@ impl<F: Fn(&[f64]) -> f64 + Sync> LogDensity for Toy<F> {
 /// A function of a position.
 type Function = Box<dyn Fn(&[f64]) -> f64>;
 
-/// One evaluation after the other: for densities that cost less than handing them to a thread.
+/// One evaluation after the other: for densities cheaper than the overhead of a thread.
 struct Serial<'a>(&'a dyn LogDensity);
 
 impl Evaluator for Serial<'_> {

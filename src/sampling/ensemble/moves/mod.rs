@@ -1,7 +1,7 @@
-//! Moves: how a walker is proposed a new place, given the walkers of the other half. One file a move.
+//! Moves: proposals for a walker, given the walkers of the other half. One file per move.
 //!
 //! Moves see sampling coordinates only. A new move is one file, one field of [`MoveWeights`] and one line of
-//! [`MoveWeights::mix`]; a move that needs data of its own is added with [`Mix::with`]. The tests of every move call
+//! [`MoveWeights::mix`]; a move that needs its own data is added with [`Mix::with`]. The tests of every move call
 //! `harness::check`.
 
 mod differential_evolution;
@@ -18,25 +18,25 @@ use rand::{Rng, RngCore};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A place to go to.
+/// A proposal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposal {
     /// The new position, in sampling coordinates.
     pub position: Vec<f64>,
     /// ln of the Hastings factor: ln q(current | proposed) - ln q(proposed | current), with any Jacobian of the move.
     pub log_factor: f64,
-    /// Which move made it.
+    /// The move that made it.
     pub by: MoveKind,
-    /// Whether the move added a vector that does not depend on `current` and whose opposite was as probable. Only such
-    /// a move is still reversible after a periodic coordinate was wrapped; of any other, the sampler refuses proposals
-    /// beyond the wrap.
+    /// Whether the move added a vector that does not depend on `current` and whose opposite was equally probable. Only
+    /// such a move is still reversible after a periodic coordinate was wrapped; of any other, the sampler refuses
+    /// proposals beyond the wrap.
     pub translation: bool,
 }
 
 /// A way of proposing a new position.
 pub trait Move: Send + Sync {
-    /// Proposes a place for a walker at `current`, given the positions `complement` of the other half of its ensemble
-    /// (at least two), all in sampling coordinates. May draw up to 2^15 words of random numbers.
+    /// Proposes a position for a walker at `current`, given the positions `complement` of the other half of its
+    /// ensemble (at least two), all in sampling coordinates. May draw up to 2^15 words of random numbers.
     fn propose(&self, current: &[f64], complement: &[Vec<f64>], rng: &mut dyn RngCore) -> Proposal;
 }
 
@@ -81,7 +81,7 @@ impl MoveWeights {
         Ok(())
     }
 
-    /// The moves that need nothing but the walkers.
+    /// The moves that need only the walkers.
     pub fn mix(&self) -> Mix {
         Mix::default()
             .with(self.stretch, Box::new(Stretch::default()))
