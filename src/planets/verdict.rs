@@ -173,15 +173,9 @@ impl Verdict {
         Verdict::judged((one_sided(significance), None), signal, remarks, Some(known))
     }
 
-<<<<<<< HEAD
     /// Of a signal with that false-alarm probability, from that many simulations.
     pub fn new(false_alarm_probability: f64, draws: usize, signal: Signal, remarks: &[Remark]) -> Self {
         Verdict::judged((false_alarm_probability, Some(draws)), signal, remarks, None)
-=======
-    /// The verdict on a signal with that false-alarm probability.
-    pub fn new(false_alarm_probability: f64, signal: Signal, remarks: &[Remark]) -> Self {
-        Verdict::judged(false_alarm_probability, signal, remarks, None)
->>>>>>> words
     }
 
     fn judged(
@@ -316,15 +310,10 @@ fn caveats(against: &[String]) -> String {
     if against.is_empty() { String::new() } else { format!(" Caveats: {}.", against.join("; ")) }
 }
 
-<<<<<<< HEAD
 /// Simulations of a search whose file does not have their number.
 pub fn usual_draws() -> usize {
     10_000
 }
-=======
-/// Below this a false-alarm probability is extrapolated beyond the simulations.
-pub const SIMULATED_FAP: f64 = 1e-4;
->>>>>>> words
 
 fn chance(p: f64, draws: Option<usize>) -> String {
     false_alarm(p, draws.unwrap_or_else(usual_draws))

@@ -12,13 +12,8 @@ const NAMES: [&str; 4] = ["period_d", "t_max_rv_d", "t_conjunction_d", "msini_mj
 const PROT: f64 = 3.0;
 const EPOCH: f64 = 2_459_000.5;
 
-<<<<<<< HEAD
 /// What a summary, a table and a page say of phi.
 const PHI: &str = "time from star.epoch_d to the next RV maximum, in orbital cycles";
-=======
-/// The description of phi in a summary, a table and a page.
-const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity";
->>>>>>> words
 
 /// A star of known mass with a planet, its orbit free.
 fn config() -> Value {

@@ -178,13 +178,8 @@ fn evolving(draft: &mut Draft, Observed { place, profiles, values, known }: Obse
         format!(" (spot amplitude {:.2}{lifetime})", field.spot_amplitude)
     });
     let chi2 = maps.summary.chi2_per_datum;
-<<<<<<< HEAD
     trial.end = End::Fits(format!("evolving maps fit {of} profiles with χ²/N = {chi2:.2}{spots}"));
     // errors of one data set are those of all its profiles; a scene of several takes a fit
-=======
-    trial.end = End::Fits(format!("evolving maps fit {of} profiles with chi2 = {chi2:.2} per datum{spots}"));
-    // uncertainties of one data set use all its profiles; several data sets require a fit
->>>>>>> words
     trial.errors = match profiles {
         [_] => vec![self::scene(draft, place.config, profiles)?.measured.errors],
         _ => scene.measured.sets.iter().map(|set| set.errors.clone()).collect(),

@@ -283,7 +283,6 @@ fn of_choices(robustness: Option<&Robustness>, height: f64, level: f64) -> Vec<R
     remarks
 }
 
-<<<<<<< HEAD
 /// That a signal is not significant without whichever of many nights, though its K stays.
 fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Option<Remark> {
     let orbits = || robustness.nights.iter().filter_map(|night| night.orbit);
@@ -303,9 +302,6 @@ fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Op
 }
 
 /// That a signal is not significant beside such offsets.
-=======
-/// That a signal is not significant with such offsets.
->>>>>>> words
 pub fn of_night_offsets(NightOffsets { sigma_kms, false_alarm_probability, .. }: NightOffsets) -> Option<Remark> {
     (false_alarm_probability > CANDIDATE_FAP).then(|| {
         Remark::against(

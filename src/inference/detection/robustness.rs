@@ -219,19 +219,11 @@ impl Robustness {
         (largest > MOVES).then_some(largest)
     }
 
-<<<<<<< HEAD
     /// Nights that make the result: without which K moves by more than the profiles left out explain, and others without
     /// which ln L of the orbit falls below `level`, where it was above.
     pub fn decisive_nights(&self, level: f64) -> [Vec<&WithoutNight>; 2] {
         let Some(all) = self.all else { return [Vec::new(), Vec::new()] };
         let moves = |night: &&WithoutNight| {
-=======
-    /// Nights that drive the result: without one, ln L of the orbit falls below `level`, or K moves by more than
-    /// expected from the number of profiles left out.
-    pub fn decisive_nights(&self, level: f64) -> Vec<&WithoutNight> {
-        let Some(all) = self.all else { return Vec::new() };
-        let decides = |night: &&WithoutNight| {
->>>>>>> words
             night.orbit.is_none_or(|orbit| {
                 // for nested data the variance of the difference is the difference of the variances
                 let by_chance = (orbit.sigma_k_kms.powi(2) - all.sigma_k_kms.powi(2)).max(0.0).sqrt();

@@ -158,7 +158,6 @@ impl Search {
     }
 }
 
-<<<<<<< HEAD
 /// sigma_K at the trial period closest to `Porb = Prot` over its median over periods away from it: how much worse an
 /// orbit is bounded where the star's spots imitate one. `None` where the data bound none there.
 pub fn co_rotation_penalty(rows: &[Row], frequencies: &Frequencies) -> Option<f64> {
@@ -167,15 +166,6 @@ pub fn co_rotation_penalty(rows: &[Row], frequencies: &Frequencies) -> Option<f6
     let here = closest.trial.orbit?.sigma_k_kms;
     let away = rows.iter().filter(|row| off(row) > 1.0);
     let mut others: Vec<f64> = away.filter_map(|row| Some(row.trial.orbit?.sigma_k_kms)).collect();
-=======
-/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is constrained
-/// where the star's spots mimic one. `None` where no orbit is bounded there.
-pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> Option<f64> {
-    let here = orbits::at(quadratic, 1.0).orbit?.sigma_k_kms;
-    let away = |trial: &&Trial| (trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;
-    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
-    let mut others: Vec<f64> = trials.iter().filter(away).filter_map(|t| Some(t.orbit?.sigma_k_kms)).collect();
->>>>>>> words
     others.sort_by(f64::total_cmp);
     others.get(others.len() / 2).map(|median| here / median)
 }

@@ -52,11 +52,7 @@ impl Imitation {
         self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
     }
 
-<<<<<<< HEAD
     /// In a few words: `consistent with 2 P_rot`, `alias of P_rot/3 at 1.003/d`.
-=======
-    /// A short description: `consistent with 2 Prot`, `alias of Prot/3 at 1.003/d`.
->>>>>>> words
     pub fn words(&self, rotation_period_d: f64) -> String {
         match &self.alias {
             None => format!("consistent with {}", self.period()),
