@@ -92,7 +92,9 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     };
     let mut figure = curves.draw();
     let spots = match fit.field.is_some() {
-        true => "spots marginalised out; their uncertainties are correlated",
+        true => {
+            "marginalised over spots; uncertainties are correlated, and include the RV jitter, with a planet's signal"
+        }
         false => "spots of the model taken out",
     };
     let folded = match curves.folds() {

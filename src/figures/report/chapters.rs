@@ -81,6 +81,7 @@ fn search(file: &PeriodogramFile) -> Chapter {
         orbit.push(row(quantity.name(), value, sigma, file.derived_truth.get(quantity.name()).copied()));
         notes.extend(note(quantity.name(), quantity.definition()));
     }
+    notes.extend(file.significance());
     notes.push(file.co_rotation.statement.clone());
     notes.extend(file.evidence.as_ref().map(|evidence| evidence.sentence.clone()));
     let unit = Speeds::of(&file.peaks.iter().map(|peak| peak.orbit.k_kms).collect::<Vec<_>>());

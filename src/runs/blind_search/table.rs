@@ -4,7 +4,7 @@
 use super::quantities::QuantitiesRecord;
 use super::record::{
     FalseAlarmRecord, KeplerianRecord, NightRecord, OrbitRecord, PeakRecord, PeriodogramFile, QuickRecord,
-    RobustnessRecord,
+    RobustnessRecord, SearchRecord,
 };
 use crate::inference::detection::HeldOut;
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
@@ -55,7 +55,7 @@ impl PeriodogramFile {
         if !self.known_planets.is_empty() {
             text += &format!("blind search beside the known planet{}:\n", plural(self.known_planets.len()));
         }
-        text += &format!("{}\n", chance(&self.false_alarm));
+        text += &format!("{}\n{}\n", chance(&self.false_alarm), self.searched());
         if let Some(evidence) = &self.evidence {
             text += &format!("evidence: {}\n", evidence.sentence);
         }
@@ -76,6 +76,19 @@ impl PeriodogramFile {
             text += &format!("warning: {warning}\n");
         }
         text
+    }
+
+    /// At which periods.
+    fn searched(&self) -> String {
+        let SearchRecord { periods, min_period_d, max_period_d, .. } = self.search;
+        format!("Searched: {min_period_d:.3} to {max_period_d:.1} d ({periods} periods)")
+    }
+
+    /// How significant the highest peak is, at which periods it was searched, and how single nights count.
+    pub fn significance(&self) -> Vec<String> {
+        let nights = without_nights(&self.robustness.without_night) + &held_out(&self.robustness);
+        let text = format!("{}\n{}\n{nights}", chance(&self.false_alarm), self.searched());
+        text.lines().map(|line| format!("{line}.")).collect()
     }
 
     /// What is said of the planets, a line each.
@@ -186,15 +199,19 @@ fn robustness(found: &RobustnessRecord) -> String {
         let short = if at.reached { "" } else { " (not reached)" };
         row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
     }));
-    let held = found.held_out_nights.map_or_else(String::new, |held| {
+    let targets = if found.targets.is_empty() { String::new() } else { aligned(&rows) };
+    targets + &without_nights(&found.without_night) + &held_out(found)
+}
+
+/// Whether held-out nights are predicted better with the planet.
+fn held_out(found: &RobustnessRecord) -> String {
+    found.held_out_nights.map_or_else(String::new, |held| {
         let HeldOut { delta_ln_p, sigma_delta_ln_p, nights } = held;
         let gain = format!("{delta_ln_p:.1} ± {sigma_delta_ln_p:.1}");
         format!(
-            "held-out nights, predicted from the others: Δln p = {gain} (planet minus no planet, {nights} nights)\n"
+            "Held-out nights, predicted from the others: Δln p = {gain} (planet minus no planet, {nights} nights)\n"
         )
-    });
-    let targets = if found.targets.is_empty() { String::new() } else { aligned(&rows) };
-    targets + &without_nights(&found.without_night) + &held
+    })
 }
 
 /// How far K and the height of the peak depend on a single night.
@@ -211,7 +228,7 @@ fn without_nights(nights: &[NightRecord]) -> String {
     };
     let k = |kms: f64| speed(kms, 0.1 * high.abs());
     format!(
-        "without any one night: K = {} to {}, Δln L ≥ {lowest:.1} (without night {time_d:.2}; {} nights)\n",
+        "Without any one night: K = {} to {}, Δln L ≥ {lowest:.1} (without night {time_d:.2}; {} nights)\n",
         k(low),
         k(high),
         nights.len()
