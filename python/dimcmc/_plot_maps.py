@@ -228,7 +228,7 @@ def one_map(result: Result, numbers: Arrays, name: str) -> Sheet:
         cycles = cycles[(times >= of.first_d - 1e-9) & (times <= of.last_d + 1e-9)]
     title = _title("reconstructed", of.get("spottedness"), is_bright)
     if season is not None:
-        title = f"season {season + 1}, {of.first_d:.2f} to {of.last_d:.2f} d: {title}"
+        title = f"season {season + 1}, {of.first_d:.2f} to {of.last_d:.2f} d\n{title}"
     stars = [_Star(title, rings.latitudes, rings.cells(values), *look, cycles, rims=rims)]
     if known is not None:
         title = _title("injected", of.get("true_spottedness"), is_bright)
