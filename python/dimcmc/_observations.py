@@ -181,7 +181,8 @@ class Observations:
 
     def __repr__(self) -> str:
         velocities, times = self.velocities_kms, self.times_d
-        span = f"{velocities.min():g} to {velocities.max():g} km/s, {times.min():g} to {times.max():g} d"
+        # two decimals: Julian dates are long, and nights differ by one
+        span = f"{velocities.min():g} to {velocities.max():g} km/s, {times.min():.2f} to {times.max():.2f} d"
         return f"Observations: {len(self)} profiles of {self.intensity.shape[1]} bins, {span}"
 
 

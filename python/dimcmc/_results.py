@@ -205,21 +205,27 @@ class Result:
         dpi : float
             Pixels of the program's own PNG to the inch.
         ax : matplotlib axes, sequence of them, or True
-            Where to draw, an axes for each panel; True for a new matplotlib figure.
+            Where to draw, an axes for each panel; True for a new matplotlib figure. On a single axes, figures of
+            several panels draw the main one: spot-corrected velocities of ``"rv"``, the likelihood of
+            ``"periodogram"``, all profiles in one column. Maps follow the projection of the axes: ``"polar"``,
+            ``"mollweide"``, or longitude against latitude on ordinary ones.
         width : float, optional
             Width of a new matplotlib figure (inches).
         style : str, dict or list, optional
-            Style of matplotlib, as `matplotlib.style.context` takes it.
+            Style of matplotlib, as `matplotlib.style.context` takes it; by default that of the program's own
+            figures. ``[]`` is the style in force.
 
         Returns
         -------
         Figure, or matplotlib axes
-            Axes are an array of shape (rows, columns) where there are several.
+            Axes are an array of shape (rows, columns) where there are several: a panel over several cells is in each
+            of them, an empty cell is None.
 
         Examples
         --------
         >>> axes = run.figure("corner", ax=True, width=6.0, style="ggplot")   # doctest: +SKIP
         >>> axes[0, 0].figure.savefig("corner.pdf")                           # doctest: +SKIP
+        >>> search.figure("rv", ax=axis)                                      # doctest: +SKIP
         """
         if ax is None and width is None and style is None:
             return Figure(*_core.figure(os.fspath(self.folder), name, dpi))
@@ -236,7 +242,8 @@ class Result:
         Returns
         -------
         dict of str to numpy.ndarray
-            Columns of the table that is drawn; pixels of maps, shape (maps, pixels); draws of the parameters.
+            Columns of the table that is drawn; pixels of maps, shape (maps, pixels); draws of the parameters;
+            estimates of ``"comparison"``, a row (value, 68 % interval) for each parameter.
 
         Examples
         --------

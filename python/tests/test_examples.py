@@ -83,9 +83,9 @@ def test_the_readme_runs(desk: Path, capsys: pytest.CaptureFixture[str]) -> None
 def test_the_guides_run(desk: Path, page: str) -> None:
     names: dict[str, Any] = {}
     for block in blocks((ROOT / "docs" / page).read_text()):
-        samplers = [name for name in ("emcee", "dynesty") if f"import {name}" in block]
-        if all(importlib.util.find_spec(name) for name in samplers):
-            if samplers == ["dynesty"]:
+        others = [name for name in ("emcee", "dynesty", "matplotlib") if f"import {name}" in block]
+        if all(importlib.util.find_spec(name) for name in others):
+            if others == ["dynesty"]:
                 # to its end it would be most of the time of all tests
                 block = quicker(block, ("nlive=500", "nlive=20"), ("run_nested()", "run_nested(maxcall=100)"))
             if "dimcmc.init(" in block:

@@ -24,6 +24,8 @@ def test_shapes_of_errors_and_velocities() -> None:
     shifted = VELOCITIES + np.arange(5.0)[:, np.newaxis]
     assert np.allclose(dimcmc.Observations(TIMES, shifted, INTENSITY, 1e-3).velocities_kms, shifted)
     assert len(whole) == 5 and "5 profiles of 21 bins, -20 to 20 km/s" in repr(whole)
+    late = dimcmc.Observations(2_459_010.25 + TIMES, VELOCITIES, INTENSITY, 1e-3)
+    assert repr(late).endswith("2459010.25 to 2459014.25 d")
     assert pickle.loads(pickle.dumps(whole)) == whole
     # Fortran's order, other numbers, views
     turned = dimcmc.Observations(TIMES.astype(int), VELOCITIES, np.asfortranarray(INTENSITY), np.float32(1e-3))
