@@ -162,8 +162,11 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
     }
     let mut legend = Legend::default();
+    // the names of many would be wider than the figure
+    let short = shape.ensembles > 4;
     for (e, colour) in SERIES.into_iter().enumerate().take(shape.ensembles) {
-        legend.add(Key::Line(Stroke::new(colour, 1.0)), &format!("ensemble {}", e + 1));
+        let name = if short && e > 0 { (e + 1).to_string() } else { format!("ensemble {}", e + 1) };
+        legend.add(Key::Line(Stroke::new(colour, 1.0)), &name);
     }
     legend.add(Key::Area(GREY.opacity(0.2)), "burn-in");
     if sampled.manifest.origin.truth.is_some() {

@@ -116,11 +116,6 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
     let best = Motion::from(Orbit { k_kms, porb_over_prot, phi });
     let first = file.first_known().map_or(best.first, KnownPlanetRecord::eccentric);
     let motion = Motion { first, second: file.other_known().first().map(KnownPlanetRecord::eccentric) };
-    // velocities count from a systemic velocity that is found
-    let offset_kms = match file.systemic_velocity {
-        Some(_) => 0.0,
-        None => file.offset.as_ref().map_or(0.0, |offset| offset.velocity_kms),
-    };
     let table = Columns::read(&folder.join(FILE))?;
     if let Ok(covariance) = std::fs::read_to_string(folder.join(COVARIANCE)) {
         table.check_rows(covariance.lines().count(), &format!("those of {COVARIANCE}"))?;
@@ -136,8 +131,13 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
     };
     let cycle = table.column_within("cycle", ANY)?;
     let clean = series("observed", "", "rv_kms", "rv_sigma_kms", POINT)?;
-    let orbit: Vec<f64> = cycle.iter().map(|cycle| offset_kms + motion.velocity_kms(*cycle)).collect();
-    let residual = clean.less(&orbit);
+    let orbit: Vec<f64> = cycle.iter().map(|cycle| motion.velocity_kms(*cycle)).collect();
+    // velocities count from a systemic velocity that is found; from a given one, all may be off alike
+    let offset_kms = match (file.systemic_velocity, &file.offset) {
+        (None, Some(_)) => clean.less(&orbit).mean(),
+        _ => 0.0,
+    };
+    let residual = clean.less(&orbit.iter().map(|kms| offset_kms + kms).collect::<Vec<_>>());
     let curves = Curves {
         time_d: table.column_within("time_d", ANY)?,
         cycle,
@@ -365,6 +365,11 @@ impl<'a> Series<'a> {
     fn less(&self, y_kms: &[f64]) -> Series<'a> {
         let y = self.y.iter().zip(y_kms).map(|(y, less)| y - less).collect();
         Series { y, sigma: self.sigma.clone(), ..*self }
+    }
+
+    /// Their mean (km/s), 0 of none.
+    fn mean(&self) -> f64 {
+        self.y.iter().sum::<f64>() / self.y.len().max(1) as f64
     }
 
     /// Some of them.
