@@ -229,7 +229,8 @@ def settings(rows):
             spread = f"{min(ratio):.2f} to {max(ratio):.2f}"
             lowest = f"{min(values):.2g}" if values else "-"
             lines.append([setting, len(of), f"{np.median(ratio):.2f}", spread, lowest, len(right), *inside])
-    head = "setting; stars; sigma_K over the default's (median); range; lowest FAP; planets at the right period"
+    head = "setting; stars; sigma_K over the default's (median); range; lowest FAP"
+    head += "; highest peak at the right period (any FAP)"
     head += "; K within 1 sigma; within 2 sigma"
     return calibration_table.table(head.split("; "), lines)
 
