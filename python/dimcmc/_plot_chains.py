@@ -72,7 +72,7 @@ class _Parameter:
         return values if self.mode is None else nearest_turn(values, self.mode)
 
     def values(self, draws: Array) -> Array:
-        """Draws as they are shown."""
+        """Draws in the unit shown."""
         scaled: Array = self.shown.factor * self.unwrapped(draws)
         return scaled
 
@@ -405,7 +405,7 @@ class _Landscape:
         return float(x if turn is None else nearest_turn(x, turn))
 
     def axis(self, k: int) -> Array:
-        """Nodes as they are shown."""
+        """Nodes in the unit shown."""
         return self.shown[k].factor * self.nodes[k]
 
 

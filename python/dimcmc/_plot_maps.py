@@ -162,7 +162,7 @@ def maps_arrays(result: Result) -> Arrays:
 
 
 def maps(result: Result, numbers: Arrays, projection: str) -> Sheet:
-    """Maps of a star that changes, and the mean standard deviation of their pixels."""
+    """Evolving maps, and the mean standard deviation of their pixels."""
     content = result._json("map.json")
     rings = _Rings(content.ring_pixels)
     filling, sigma = numbers["spot_filling"], numbers["sigma_spot_filling"].mean(axis=0)
@@ -292,7 +292,7 @@ def _discs(spots: Sequence[Any]) -> tuple[Array, Array]:
 
 
 def _simulated(result: Result) -> list[_Star]:
-    """The injected spots, as large as they are in the middle of the data."""
+    """The injected spots, at their size in the middle of the data."""
     truth = result._json("truth.json")
     times = np.array(truth.times_d)
     middle = 0.5 * (times.min() + times.max())

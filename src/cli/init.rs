@@ -8,7 +8,7 @@ use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, LightCurve, List, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
 use crate::data::io::{FileError, atomic, lsd};
-use crate::numerics::text::shown;
+use crate::numerics::text::{Align, columns, shown};
 use crate::star::BrightnessModel;
 use crate::surface::ObjectiveKind;
 use clap::{Args as _, FromArgMatches as _};
@@ -408,14 +408,17 @@ fn plain(text: &str) -> Option<String> {
 pub fn next_commands(proposal: &Proposal, path: &Path) {
     let config = shown(path);
     let next = match proposal.complete {
-        true => format!(
-            "next:\n  \
-             dimcmc map {config} --out map               does the model fit? is the map plausible?\n  \
-             dimcmc periodogram {config} --out search    is there a planet, and at which period?\n  \
-             dimcmc limits {config} --out limits         which planets would have been detected?\n  \
-             dimcmc sample {config} --out run            the posterior\n  \
-             dimcmc report map search limits run         one HTML page of all of it\n"
-        ),
+        true => {
+            let row = |command: String, what: &str| vec![command, what.to_owned()];
+            let rows = [
+                row(format!("  dimcmc map {config} --out map"), "does the model fit? is the map plausible?"),
+                row(format!("  dimcmc periodogram {config} --out search"), "is there a planet, and at which period?"),
+                row(format!("  dimcmc limits {config} --out limits"), "which planets would have been detected?"),
+                row(format!("  dimcmc sample {config} --out run"), "the posterior"),
+                row("  dimcmc report map search limits run".to_owned(), "one HTML page of all of it"),
+            ];
+            format!("next:\n{}", columns(&rows, &[Align::Left, Align::Left]))
+        }
         false => format!("next: correct {config} as the notes say, then\n  dimcmc map {config} --out map\n"),
     };
     console::print(next);

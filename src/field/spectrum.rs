@@ -1,6 +1,6 @@
-//! Variance of the field by degree of its spherical harmonics (`docs/method.md` section 9): `S_l = amplitude^2 [b(b+1)
-//! + l(l+1)]^-slope / norm` with a turnover at degree b, the norm such that the variances of all coefficients sum to
-//! amplitude^2.
+//! Variance of the field by degree of its spherical harmonics (`docs/method.md` section 9):
+//! `S_l = amplitude^2 [b(b+1) + l(l+1)]^-slope / norm` with a turnover at degree b, the norm such that the variances of
+//! all coefficients sum to amplitude^2.
 //!
 //! With harmonics of unit mean square that sum is the variance of the field, the same at every point of the sphere.
 

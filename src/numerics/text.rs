@@ -21,8 +21,8 @@ pub fn shown(path: &Path) -> String {
 /// Characters of a line that is printed.
 pub const WIDTH: usize = 120;
 
-/// A line, broken between words where it is longer than [`WIDTH`]: prose goes on two characters further in, and the last
-/// column of a table below itself. A table whose last column begins beyond two thirds of the line stays whole.
+/// A line, broken between words where it is longer than [`WIDTH`]: prose goes on two characters further in, and the
+/// last column of a table below itself. A table whose last column begins beyond two thirds of the line stays whole.
 pub fn wrapped(line: &str) -> Cow<'_, str> {
     if line.chars().count() <= WIDTH {
         return Cow::Borrowed(line);

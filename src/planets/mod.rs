@@ -9,6 +9,8 @@
 //! [`evidence`] has Bayes factors of models with and without planets; [`mixture`], K where several orbits are possible;
 //! [`modes`], the periods of a posterior; [`occurrence`], the rate of planets in a sample of stars.
 //!
+//! [`speeds`] has the unit in which velocities are shown.
+//!
 //! The thresholds (false-alarm probabilities of candidate and detection among them) are constants of [`verdict`].
 
 pub mod evidence;

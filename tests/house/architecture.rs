@@ -13,7 +13,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("field", &[], &["numerics"]),
     (
         "planets",
-        &["mixture", "velocities", "verdict", "periodogram", "modes", "evidence", "occurrence"],
+        &["mixture", "velocities", "speeds", "verdict", "periodogram", "modes", "evidence", "occurrence"],
         &["numerics", "star::kepler"],
     ),
     ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics"]),

@@ -18,6 +18,7 @@ use crate::data::dataset::{Dataset, ProfileSet, SceneError};
 use crate::data::ephemeris;
 use crate::data::io::lsd::{self, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet};
+use crate::model::Parameter;
 use crate::star::observation::Observations;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::target;
@@ -77,7 +78,8 @@ impl Calibrated {
         let (zero_points, velocity_jitter) =
             errors::zero_points(settings, &imager, settings.velocity_jitter, chi2_target)?;
         let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
-        let remarks = remarks(settings, data);
+        let mut remarks = remarks(settings, data);
+        remarks.extend(cut_lines(settings, &parts));
         let mut held = imager::hold_offsets(settings, &mut imager, &suspects(&remarks))?.into_iter();
         let (indicators, indicator_notes) = indicators::used(settings, &parts, &data.indicators)?;
         let mut measured = Measured {
@@ -169,6 +171,24 @@ fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
         profiles.remarks.iter().map(of).collect::<Vec<_>>()
     };
     settings.sets.iter().zip(&data.sets).flat_map(of_set).collect()
+}
+
+/// That the velocities in use end within the line of the star, of each data set.
+fn cut_lines(settings: &Settings, parts: &[Observations]) -> Vec<String> {
+    let [vsys_kms, vsini_kms] = [Parameter::Vsys, Parameter::Vsini].map(|parameter| settings.values[parameter]);
+    let of = |part: &Observations| {
+        let profile = part.profiles.first()?;
+        let from = profile.first_velocity_kms;
+        let to = from + (profile.intensity.len() - 1) as f64 * profile.step_kms;
+        let cuts = (vsys_kms - from).min(to - vsys_kms) < vsini_kms;
+        cuts.then(|| {
+            format!(
+                "the velocities in use, {from:.0} to {to:.0} km/s, end within the line (vsini {vsini_kms:.0} km/s): \
+                line, vsini and limb darkening are poorly constrained; widen observations.velocity_range_kms"
+            )
+        })
+    };
+    parts.iter().filter_map(of).collect()
 }
 
 /// Those `remarks` on profiles that may explain a bad fit, each after `; `.

@@ -10,7 +10,7 @@ use crate::data::config::{
 };
 use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
-use crate::planets::periodogram::{Frequencies, FrequencySettings};
+use crate::planets::periodogram::{Frequencies, FrequencySettings, most_offset_kms};
 use crate::star::observation::Observations;
 use crate::star::{BrightnessModel, Size};
 use crate::surface::calibration::first_look::{FirstLook, LineModel, LookError, Noise};
@@ -299,6 +299,15 @@ impl Values {
             VelocityJitter::Word(_) => {
                 let remark = "measured by every command: RV jitter of single profiles, counted as noise";
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
+                // of static maps none are fitted
+                if draft.imaging.objective.properties().has_field {
+                    let most_kms = most_offset_kms(None);
+                    let remark = match draft.instrument.name {
+                        Some(_) => "RV offsets of nights; up to twice the stability of the spectrograph".to_owned(),
+                        None => format!("RV offsets of nights, up to {most_kms}: stability unknown; --instrument"),
+                    };
+                    ledger.note("observations.night_jitter_kms", "fitted", "km/s", Source::Assumed, remark);
+                }
             }
             VelocityJitter::Number(kms) => {
                 let remark = "too few profiles to measure the RV jitter";

@@ -292,8 +292,8 @@ fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Op
     Some(Remark::against(
         "FAP > 1 % without single nights",
         format!(
-            "Without any one of {} nights Δln L falls below the 1 % threshold, {level:.1} (lowest: {lowest:.1}); K stays \
-            {} to {}: more nights are needed.",
+            "Without any one of {} nights Δln L falls below the 1 % threshold, {level:.1} (lowest: {lowest:.1}); K \
+            stays {} to {}: more nights are needed.",
             nights.len(),
             speed(low, 0.1 * high),
             speed(high, 0.1 * high)

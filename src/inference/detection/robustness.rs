@@ -219,8 +219,8 @@ impl Robustness {
         (largest > MOVES).then_some(largest)
     }
 
-    /// Nights that make the result: without which K moves by more than the profiles left out explain, and others without
-    /// which ln L of the orbit falls below `level`, where it was above.
+    /// Nights that drive the result: without one of the first K moves by more than the profiles left out explain,
+    /// without one of the others ln L of the orbit falls from above to below `level`.
     pub fn decisive_nights(&self, level: f64) -> [Vec<&WithoutNight>; 2] {
         let Some(all) = self.all else { return [Vec::new(), Vec::new()] };
         let moves = |night: &&WithoutNight| {

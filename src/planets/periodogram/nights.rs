@@ -185,6 +185,11 @@ pub fn known_beside_offsets(
     Some(NightOffsets { sigma_kms, gain, false_alarm_probability: (1 + above) as f64 / (1 + draws) as f64 })
 }
 
+/// Largest standard deviation of offsets that a search counts (km/s), for a spectrograph of that stability (km/s).
+pub fn most_offset_kms(stability_kms: Option<f64>) -> f64 {
+    Reach::Stable.most_kms(stability_kms)
+}
+
 impl Reach {
     /// The largest (km/s).
     pub(super) fn most_kms(self, scale_kms: Option<f64>) -> f64 {

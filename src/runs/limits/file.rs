@@ -223,7 +223,7 @@ impl LimitsFile {
             let period_d = orbit.porb_over_prot * self.rotation_period_d();
             let digits = decimals(0.01 * period_d);
             text += &format!(
-                "Subtracted: P = {period_d:.digits$} d, K = {} ({})\n",
+                "Subtracted: P = {period_d:.digits$} d, K = {}, {}\n",
                 speed(-orbit.k_kms, 0.1 * orbit.k_kms.abs()),
                 false_alarm(false_alarm_probability, draws)
             );

@@ -126,16 +126,16 @@ impl SurfaceModel for StaticMap {
             remarks.push(Remark::against(
                 "no map fits to the target chi2",
                 format!(
-                    "no map reaches the target χ²/N of {target:.3} without fitting noise ({chi2:.3} reached): the target \
-                    may be too low, or the stellar model wrong"
+                    "no map reaches the target χ²/N of {target:.3} without fitting noise ({chi2:.3} reached): the \
+                    target may be too low, or the stellar model wrong"
                 ),
             ));
         } else if far.abs() > FAR {
             remarks.push(Remark::against(
                 "chi2 is far from 1",
                 format!(
-                    "χ²/N = {chi2:.3}, {far:+.1}σ from 1: the uncertainties of the profiles or the stellar model may be \
-                    wrong, and all uncertainties here with them"
+                    "χ²/N = {chi2:.3}, {far:+.1}σ from 1: the uncertainties of the profiles or the stellar model may \
+                    be wrong, and all uncertainties here with them"
                 ),
             ));
         }
