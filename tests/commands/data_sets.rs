@@ -133,7 +133,7 @@ fn what_profiles_have_in_common_is_told_apart() {
         texts(&figure)
     );
     desk.succeed(&["export", "free", "--format", "rv"]);
-    says(&desk.read("free/rv/README.txt"), &["leave a constant velocity free", &format!("{vsys:.4} +- ")]);
+    says(&desk.read("free/rv/README.txt"), &["leave a constant velocity free", &format!("{vsys:.4} ± ")]);
     assert_eq!(desk.read("free/rv/radvel.csv").lines().filter(|line| line.ends_with(",red")).count(), 7);
 }
 

@@ -218,7 +218,7 @@ fn no_text(what: NotText, Entry { path, .. }: &Entry) -> String {
 }
 
 /// The text of a remark on an outlying bin.
-const WILD: &str = "errors away from its neighbours";
+const WILD: &str = "σ off its neighbours";
 
 /// Whether a remark is on an outlying bin, which may explain a bad fit.
 pub fn tells_of_wild_bin(remark: &str) -> bool {
@@ -230,7 +230,7 @@ fn wild(entries: &[Entry], profiles: &[Profile]) -> Vec<String> {
     let remark = |wild: wild::Wild| {
         let (entry, profile) = (&entries[wild.profile], &profiles[wild.profile]);
         format!(
-            "profile {} ({}, {:.4} d): the bin at {:.2} km/s is {:.0} {WILD}, a cosmic ray? Repair it, or leave the \
+            "profile {} ({}, {:.4} d): the bin at {:.2} km/s is {:.0}{WILD} (cosmic ray?): repair it, or leave the \
              profile out",
             wild.profile + 1,
             shown(&entry.file),

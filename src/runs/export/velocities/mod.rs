@@ -178,7 +178,7 @@ fn positive(covariance: &DMatrix<f64>) -> Result<(), (usize, String)> {
 
 fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>) -> String {
     let from = match search.systemic_velocity {
-        Some(ConstantVelocity { value_kms, sigma_kms }) => format!("{value_kms:.4} +- {sigma_kms:.4} km/s."),
+        Some(ConstantVelocity { value_kms, sigma_kms }) => format!("{value_kms:.4} ± {sigma_kms:.4} km/s."),
         None => "of the config.".to_owned(),
     };
     let slope = search.drift.map_or_else(String::new, |FoundDrift { kms_d, .. }| {
@@ -188,28 +188,28 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
         "{TITLE} {}\n\n\
         {} velocities and their covariance, spots marginalised out. Times are days, as in the list of profiles.\n\
         Velocities are relative to the systemic velocity {}\n\
-        Their errors and covariance do not include the error of what all profiles, or those of a data set, have in\n\
-        common: leave a constant velocity free in every fit, for each data set{slope}.\n\n\
+        Uncertainties and covariance exclude the common RV offset of each data set: leave a constant velocity free in\n\
+        every fit, for each data set{slope}.\n\n\
         radvel.csv           m/s   radvel: time, mnvel, errvel, tel\n\
-        juliet.dat           m/s   juliet: time, velocity, error, instrument; no head\n\
+        juliet.dat           m/s   juliet: time, velocity, error, instrument; no header\n\
         kima.txt             m/s   kima: time, velocity, error; RVData('kima.txt', skip=1)\n\
         pyaneti.dat          km/s  pyaneti: time, velocity, error, telescope\n\
-        {COVARIANCE}  m2/s2 the full covariance, in the order of the tables; no head\n\
+        {COVARIANCE}  m2/s2 the full covariance, in the order of the tables; no header\n\
         {LIKELIHOOD}           it as a likelihood of radvel, and as the noise of tinygp\n\n",
         search.provenance.version,
         velocities.times_d.len(),
         from
     );
-    text += "What is lost without the covariance\n\n\
-        Errors in the tables are the square roots of its diagonal. Velocities of a spotted star are not independent,\n\
-        and a package that takes them for independent is wrong by this much:\n\n";
+    text += "Without the covariance\n\n\
+        Uncertainties in the tables are the square roots of its diagonal. Velocities of a spotted star are not\n\
+        independent. A package that assumes independence is off by this much:\n\n";
     if let Some(loss) = loss {
         let Loss { quoted, achieved, reduced_chi2 } = *loss;
         let _ = writeln!(
             text,
             "sigma_K at {:.4} d (circular orbit, constant velocity free), over that with the full covariance:\n  \
             as quoted by such a package: {quoted:.2}\n  true uncertainty: {achieved:.2}\n\
-            reduced chi2 of the best orbit that it would find on average: {reduced_chi2:.3} instead of 1",
+            mean reduced chi2 of its best orbit: {reduced_chi2:.3} instead of 1",
             search.best.period_d
         );
     }
