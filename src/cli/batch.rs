@@ -30,13 +30,13 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let signals = Signals::catch("star")?;
     let stars = read_list(&args.list, &args.folder).map_err(Failure::of)?;
-    // of those to begin; a config that cannot be read is told of with its star
+    // only for stars to begin; a config that cannot be read is reported with its star
     let to_begin = stars.iter().filter(|star| !star.folder.exists());
     note_objective(&to_begin.filter_map(|star| Config::load(&star.config).ok()).collect::<Vec<_>>());
     let output = Output::to(args.folder.clone(), true);
     drop(output.create()?);
     let folder = output.folder();
-    // a file is locked also where folders cannot be
+    // locking a file works where folders cannot be locked
     let held = lines::hold_for(&folder.join(LOCK)).map_err(|error| match error {
         JournalError::Locked { .. } => {
             Failure::failed(format!("--out {}: another `dimcmc batch` is at work there", folder.display()))

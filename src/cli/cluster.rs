@@ -1,7 +1,6 @@
-//! The place of this process among the ranks of a cluster: the first one does what is asked for, the others evaluate
-//! for it.
+//! The role of this process among the ranks of a cluster: the first one runs the command, the others evaluate for it.
 //!
-//! Without the feature `mpi`, or without a launcher, it is alone.
+//! Without the feature `mpi`, or without a launcher, it is the only one.
 
 use super::signals::Signals;
 use super::{Failure, Global};
@@ -12,16 +11,16 @@ use crate::runs::pool::Pool;
 #[cfg(feature = "mpi")]
 pub type Ranks = std::cell::RefCell<Option<crate::runs::cluster::Queue>>;
 
-/// What is left to do after joining the others.
+/// Remaining work after joining the others.
 #[derive(PartialEq, Eq)]
 pub enum Done {
     /// The command.
     Nothing,
-    /// This rank has evaluated for the first one until there was nothing more.
+    /// None: this rank has evaluated for the first one until its end.
     Everything,
 }
 
-/// Who reconstructs for a command, until a signal comes.
+/// The pool of a command, until a signal arrives.
 pub fn pool(global: &Global, signals: &Signals) -> Pool {
     #[cfg(feature = "mpi")]
     if let Some(queue) = global.ranks.take() {
@@ -31,8 +30,8 @@ pub fn pool(global: &Global, signals: &Signals) -> Pool {
     Pool::threads(signals.flag())
 }
 
-/// Claims the place of results before a long search; a signal meanwhile undoes it. Of several ranks one may end the job
-/// where it has no data, and nothing is written before: there it is claimed when what is returned is called.
+/// Claims the output before a long search; a signal meanwhile releases it. One of several ranks may end the job where
+/// it has no data, and nothing is written before: in that case the output is claimed by calling the returned function.
 pub fn claim<E>(
     pool: &Pool,
     signals: &Signals,
@@ -45,7 +44,7 @@ pub fn claim<E>(
 /// Joins the other ranks, if there are any.
 #[cfg(not(feature = "mpi"))]
 pub fn join(global: &Global) -> Result<Done, Failure> {
-    // as many programs as ranks would do the same in the same place
+    // as many programs as ranks would do the same in the same folder
     let several =
         |name| std::env::var(name).ok().and_then(|size: String| size.parse().ok()).is_some_and(|n: usize| n > 1);
     if ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().any(several) {
@@ -70,7 +69,7 @@ pub fn join(global: &Global) -> Result<Done, Failure> {
         }
         Rank::Other(worker) => {
             threads(given.or(Some(1)))?;
-            // the first rank decides when to stop; what comes to all is not to kill the others
+            // the first rank decides when to stop; a signal to all must not kill the others
             let _signals = Signals::ignore()?;
             if let Err(error) = worker.serve(crate::runs::batch::learn) {
                 super::console::error(format_args!("rank {}: {error}", worker.rank()));

@@ -1,4 +1,4 @@
-//! `dimcmc compare`: a chain against a landscape.
+//! `dimcmc compare`: a chain compared with a likelihood grid.
 
 use super::output::Output;
 use super::signals::{RESULT, Signals};

@@ -1,4 +1,4 @@
-//! `dimcmc completions`: what a shell needs to complete commands and options.
+//! `dimcmc completions`: completion scripts of shells for commands and options.
 
 use super::{Failure, console};
 use clap_complete::Shell;

@@ -1,6 +1,6 @@
-//! The only way to the terminal: results on stdout, errors on stderr. Nothing that happens to either stream stops a
-//! command or the thread that waits for signals: a stream that is gone is written to in vain, and results that a full
-//! disk has swallowed are a failure once the command has ended.
+//! The only way to the terminal: results on stdout, errors on stderr. An error of either stream stops neither a command
+//! nor the thread that waits for signals: output to a closed stream is dropped, and results lost on a full disk are a
+//! failure once the command has ended.
 
 use super::Failure;
 use crate::numerics::text::{escaped, wrapped};
@@ -8,10 +8,10 @@ use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::sync::Mutex;
 
-/// What the system said when results could not be printed for the first time.
+/// The system's message when results could not be printed for the first time.
 static LOST: Mutex<Option<String>> = Mutex::new(None);
 
-/// Prints results, control characters in them escaped and long lines broken.
+/// Prints results, with control characters escaped and long lines broken.
 pub fn print(text: impl Display) {
     let lines: Vec<String> = text.to_string().split('\n').map(|line| wrapped(&escaped(line)).into_owned()).collect();
     print_bytes(lines.join("\n").as_bytes());
@@ -34,18 +34,18 @@ pub fn print_bytes(bytes: &[u8]) {
     }
 }
 
-/// Prints on stderr what went wrong, in one line for whoever searches logs; in vain where stderr is gone.
+/// Prints an error on stderr, in one line for searches in logs; ignored if stderr is closed.
 pub fn error(message: impl Display) {
     aside(&format!("error: {}", escaped(&message.to_string())));
 }
 
-/// Prints on stderr what has to be known beside the results.
+/// Prints a note on the results on stderr.
 pub fn note(message: impl Display) {
     aside(&wrapped(&format!("note: {}", escaped(&message.to_string()))));
 }
 
 fn aside(text: &str) {
-    // one write: a line of another process does not come between
+    // one write, so that no line of another process comes between
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 

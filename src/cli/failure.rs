@@ -1,6 +1,5 @@
-//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what
-//! can go on, 1 for anything else. Which error of the system is the input's fault is said in one place,
-//! [`Failure::of`].
+//! Why a command stopped, with the exit code: 2 for bad usage or input, 75 where a scheduler stopped a resumable
+//! command, 1 for anything else. Only [`Failure::of`] decides which errors of the system are due to the input.
 
 use crate::data::config::ConfigError;
 use crate::data::init::ProposalError;
@@ -34,13 +33,13 @@ use std::path::Path;
 /// Exit code of bad usage or input.
 const INPUT: u8 = 2;
 
-/// Exit code of a command that failed all the same.
+/// Exit code of another failure.
 const FAILED: u8 = 1;
 
 /// Exit code of a command that Ctrl-C stopped.
 pub const INTERRUPTED: u8 = FAILED;
 
-/// Exit code of a command that a scheduler stopped and that can go on: sysexits' EX_TEMPFAIL.
+/// Exit code of a resumable command that a scheduler stopped: sysexits' EX_TEMPFAIL.
 pub const RESUME: u8 = 75;
 
 /// A message of one line for the user, with its exit code.
@@ -52,27 +51,27 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// Bad usage or input: the user can put it right.
+    /// Bad usage or input, which the user can correct.
     pub fn input(message: impl Into<String>) -> Self {
         Failure { code: INPUT, message: message.into() }
     }
 
-    /// Bad usage or input, unless the system is behind it: a full disk or a missing permission is nobody's input.
+    /// Bad usage or input, unless the system is the cause, such as a full disk or a missing permission.
     pub fn of(error: impl Error + 'static) -> Self {
         Failure { code: if is_of_system(&error) { FAILED } else { INPUT }, message: error.to_string() }
     }
 
-    /// The system has refused something; `message` says what.
+    /// The system has refused an operation; `message` names it.
     pub fn system(error: &std::io::Error, message: impl Into<String>) -> Self {
         Failure { code: if is_of_system(error) { FAILED } else { INPUT }, message: message.into() }
     }
 
-    /// The input was right, and yet it did not work.
+    /// A failure despite correct input.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Failure { code: FAILED, message: message.to_string() }
     }
 
-    /// The same with what is to be said after it.
+    /// The same with a further message.
     pub fn with(self, more: &str) -> Self {
         Failure { message: self.message + more, ..self }
     }
@@ -149,7 +148,7 @@ impl Failure {
         }
     }
 
-    /// A run of the config at `path` that cannot begin or go on.
+    /// A run of the config at `path` that cannot begin or be resumed.
     pub fn run(path: &Path, error: RunError) -> Self {
         match error {
             RunError::Config(error) => error.into(),
@@ -166,7 +165,7 @@ impl Failure {
         }
     }
 
-    /// A landscape of the config at `path` that cannot begin or go on.
+    /// A likelihood grid of the config at `path` that cannot begin or be resumed.
     pub fn grid_scan(path: &Path, error: GridScanError) -> Self {
         match error {
             GridScanError::Origin(error) => Failure::origin(path, error),
@@ -175,7 +174,7 @@ impl Failure {
         }
     }
 
-    /// What began in a folder cannot go on with the config at `path`.
+    /// A computation in a folder that cannot be resumed with the config at `path`.
     pub fn origin(path: &Path, error: OriginError) -> Self {
         match error {
             OriginError::Reference(RebuildError::Reference(error)) => Failure::reference(path, error),
@@ -189,7 +188,7 @@ impl Failure {
         self.code
     }
 
-    /// Whether it is bad usage or input, which the user can put right.
+    /// Whether it is bad usage or input, which the user can correct.
     pub fn is_input(&self) -> bool {
         self.code == INPUT
     }
@@ -288,8 +287,8 @@ impl From<PlotError> for Failure {
     }
 }
 
-/// Whether an error, or what is behind it, is the system's: anything but a file that is missing, there already, or no
-/// file of that kind.
+/// Whether an error, or its source, is the system's: any but a file that is missing, exists already, or has another
+/// format.
 fn is_of_system(error: &(dyn Error + 'static)) -> bool {
     let mut behind = Some(error);
     while let Some(error) = behind {

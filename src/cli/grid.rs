@@ -1,4 +1,4 @@
-//! `dimcmc grid`: the landscape and its paraboloid.
+//! `dimcmc grid`: the likelihood grid and its paraboloid.
 
 use super::output::{Output, fitted, remarks, scene};
 use super::search::search;
@@ -85,7 +85,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
     noted?;
     let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
-    // whoever reads may stop reading
+    // a reader may close the pipe
     console::print(scan.conclude(folder, rule)?);
     let images = match scan.warm_starts() {
         0 => String::new(),
@@ -99,11 +99,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Progress of a grid, and how long it took.
+/// Progress of a grid, and its duration.
 struct Meter {
     bar: indicatif::ProgressBar,
     began: Instant,
-    /// Nodes that were there before.
+    /// Nodes from an earlier session.
     before: usize,
 }
 
@@ -123,7 +123,7 @@ impl Meter {
         self.bar.set_message(format!("{done}/{total}, {:#} left, {rate:.0} rec/s", indicatif::HumanDuration(left)));
     }
 
-    /// Seconds of this part of the computation; the search before it, and the images that nodes start from, left out.
+    /// Seconds of this part of the computation, without the preceding search and the warm-start images.
     fn cost(&self, landscape: &Landscape) -> String {
         let nodes = landscape.nodes().len() - self.before;
         let now = if self.before == 0 { "" } else { " now" };

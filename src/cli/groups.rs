@@ -1,8 +1,8 @@
-//! The commands in the order in which one meets them, for `dimcmc --help`.
+//! The commands in the order of their use, for `dimcmc --help`.
 
 use clap::Command;
 
-/// Groups of commands with their titles. A command that is in none is shown last, by itself.
+/// Groups of commands with their titles. Commands without a group are shown last.
 const GROUPS: &[(&str, &[&str])] = &[
     ("Begin", &["init", "import", "plan", "simulate", "inject"]),
     ("Image and search", &["map", "periodogram", "limits", "optimise", "grid"]),
@@ -29,7 +29,7 @@ fn list(command: &Command) -> String {
     let groups = GROUPS.iter().copied().chain(std::iter::once(("Others", others.as_slice())));
     let about = |name: &str| match command.find_subcommand(name) {
         Some(found) => Some(found.get_about().map(ToString::to_string).unwrap_or_default()),
-        // clap's own, which is not there yet
+        // clap's own command, which does not exist yet
         None => (name == "help").then(|| "Show the help of a command".to_owned()),
     };
     let width = command.get_subcommands().map(|c| c.get_name().len()).max().unwrap_or(0);

@@ -59,7 +59,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = proposal.map_err(|error| args.known.failure(error, &args.input))?;
     let _claimed = args.output.claim(Some(&list))?;
     signals.defer();
-    // the list first, so that where the config is its observations are
+    // the list first, so that an existing config has its observations
     atomic::write(&list, import.list.as_bytes())?;
     atomic::write(config, proposal.json.as_bytes())?;
     let (table, left_out) = (proposal.table(), import.table());

@@ -111,11 +111,11 @@ pub struct KnownArgs {
 /// The option that names spectrographs.
 const INSTRUMENT: &str = "--instrument";
 
-/// Where an option's value goes.
+/// The setter for an option's value.
 type Slot = fn(&mut Known) -> &mut Option<Given<f64>>;
 
 impl KnownArgs {
-    /// Every option with its value, its key in the config, and where it goes.
+    /// Every option with its value, its key in the config, and its setter.
     fn options(&self) -> [(&'static str, Option<f64>, &'static str, Slot); 11] {
         [
             ("--rotation-period", self.rotation_period, "star.rotation_period_d", |known| &mut known.rotation_period_d),
@@ -134,14 +134,14 @@ impl KnownArgs {
         ]
     }
 
-    /// The options that are there replace what is `known` otherwise.
+    /// The given options replace the values in `known`.
     pub fn over(&self, mut known: Known) -> Result<Known, Failure> {
         if let Some(spectrograph) = self.spectrographs()?.first() {
             let given = |value: f64| Some(Given { value, by: INSTRUMENT.to_owned() });
             let by = format!("{INSTRUMENT}; {}", spectrograph.source);
             known.instrument_name = Some(Given { value: spectrograph.name, by });
             known.resolving_power = given(spectrograph.resolving_power);
-            // a file says at what wavelength its profiles are
+            // a file specifies the wavelength of its profiles
             known.wavelength_nm = known.wavelength_nm.or(given(spectrograph.wavelength_nm));
         }
         for (name, value, _, slot) in self.options() {
@@ -184,8 +184,8 @@ impl KnownArgs {
         Ok(known)
     }
 
-    /// Values of an option for `lists` lists: none, one for all, or one of each; what each after the first has of its
-    /// own.
+    /// Values of an option for `lists` lists: none, one for all, or one of each; with the specific values of each after
+    /// the first.
     fn of_lists(name: &str, values: &[f64], lists: usize) -> Result<Vec<Option<Given<f64>>>, Failure> {
         if values.len() > 1 && values.len() != lists {
             let problem =
@@ -199,7 +199,7 @@ impl KnownArgs {
         Ok((0..lists).map(|s| values.get(s).map(given)).collect())
     }
 
-    /// The spectrographs that are named.
+    /// The named spectrographs.
     fn spectrographs(&self) -> Result<Vec<&'static Spectrograph>, Failure> {
         let named = |name: &String| {
             let other = "for any other give --resolving-power and --wavelength";
@@ -209,8 +209,8 @@ impl KnownArgs {
         self.instrument.iter().map(named).collect()
     }
 
-    /// Resolving powers and wavelengths (nm) for `lists` lists, of their own options or of the named spectrographs;
-    /// what each after the first has of its own.
+    /// Resolving powers and wavelengths (nm) for `lists` lists, from their options or from the named spectrographs;
+    /// with the specific values of each after the first.
     fn instruments(&self, lists: usize) -> Result<[Vec<Option<Given<f64>>>; 2], Failure> {
         let spectrographs = self.spectrographs()?;
         let of = |name: &str, values: &[f64], usual: fn(&Spectrograph) -> f64| {
@@ -225,13 +225,13 @@ impl KnownArgs {
         ])
     }
 
-    /// That options of which several lists have one each are single values.
+    /// Checks that options with one value per list are single values.
     pub fn check_single(&self) -> Result<(), Failure> {
         self.instruments(1).map(drop)
     }
 
-    /// Why there is no proposal; by its option where a value is at fault that was given by one, and by the `list` where
-    /// it was measured: the config has not been written.
+    /// Why there is no proposal; named by its option where a given value is wrong, and by the `list` where it was
+    /// measured: the config has not been written.
     pub fn failure(&self, error: ProposalError, list: &Path) -> Failure {
         if let ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })) = &error {
             let at_fault =
@@ -263,11 +263,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The first config by the `arguments` of the command, as text, and the table of its values; nothing is written.
-/// `say` is told what looks wrong before the test fit.
+/// The first config from the `arguments` of the command, as text, and the table of its values; nothing is written.
+/// `say` is called with warnings before the test fit.
 ///
 /// # Errors
-/// Arguments that make no sense, and profiles of which no config can be made.
+/// Invalid arguments, and profiles from which no config can be made.
 pub fn first_config(arguments: Vec<OsString>, say: &dyn Fn(&str)) -> Result<(String, String), Failure> {
     let command = Args::augment_args(clap::Command::new("init").no_binary_name(true));
     let wrong = |error: clap::Error| {
@@ -281,7 +281,7 @@ pub fn first_config(arguments: Vec<OsString>, say: &dyn Fn(&str)) -> Result<(Str
 }
 
 impl Args {
-    /// The config of these arguments, with where its values come from.
+    /// The config from these arguments, with the sources of its values.
     fn proposal(&self, say: &dyn Fn(&str)) -> Result<Proposal, Failure> {
         self.output.check(None)?;
         let lists = &self.observations;
@@ -305,7 +305,7 @@ impl Args {
         propose(&place, &known, say).map_err(|error| self.known.failure(error, &lists[0]))
     }
 
-    /// The lists of the contents `bytes`.
+    /// The lists with the contents `bytes`.
     fn lists<'a>(&'a self, bytes: &'a [Vec<u8>], known: &Known) -> Result<Vec<List<'a>>, Failure> {
         let lists = &self.observations;
         let several = lists.len() > 1;
@@ -361,7 +361,7 @@ impl Args {
     }
 }
 
-/// That tables given by an option that needs evolving maps are none.
+/// Refuses tables of an option that needs evolving maps.
 fn only_evolving(option: &str, tables: &[PathBuf]) -> Result<(), Failure> {
     if tables.is_empty() {
         return Ok(());
@@ -369,8 +369,8 @@ fn only_evolving(option: &str, tables: &[PathBuf]) -> Result<(), Failure> {
     Err(Failure::input(format!("{option}: takes the objective \"marginal-likelihood\": leave --objective out")))
 }
 
-/// Names of tables: those of their files without what a name must not have; `otherwise` and a number where that is
-/// nothing, or the name of one before.
+/// Names of tables: those of their files without invalid characters; `otherwise` and a number where nothing remains, or
+/// the name is taken.
 fn names_of_tables(tables: &[PathBuf], otherwise: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for (k, path) in tables.iter().enumerate() {
@@ -382,12 +382,12 @@ fn names_of_tables(tables: &[PathBuf], otherwise: &str) -> Vec<String> {
     names
 }
 
-/// Whether two paths are of one file.
+/// Whether two paths refer to the same file.
 fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Names of data sets: of their lists, or of the folders of these, whichever are different; `None` where neither are.
+/// Names of data sets: of their lists, or of the folders of these, whichever differ; `None` where neither do.
 fn names(lists: &[PathBuf]) -> Option<Vec<String>> {
     let name = |part: fn(&Path) -> Option<&std::ffi::OsStr>| -> Option<Vec<String>> {
         let of = |list: &PathBuf| plain(&part(list)?.to_string_lossy());
@@ -398,13 +398,13 @@ fn names(lists: &[PathBuf]) -> Option<Vec<String>> {
     name(|list| list.parent()?.file_name()).or_else(|| name(Path::file_stem))
 }
 
-/// The characters of `text` that a name may have; `None` where none are left.
+/// The characters of `text` that are valid in a name; `None` where none remain.
 fn plain(text: &str) -> Option<String> {
     let name: String = text.chars().filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c)).take(40).collect();
     Some(name).filter(|name| !name.is_empty())
 }
 
-/// What to do with the config at `path`.
+/// The suggested commands for the config at `path`.
 pub fn next_commands(proposal: &Proposal, path: &Path) {
     let config = shown(path);
     let next = match proposal.complete {

@@ -1,4 +1,4 @@
-//! `dimcmc inject`: an orbit put into the profiles of a config.
+//! `dimcmc inject`: an orbit injected into the profiles of a config.
 
 use super::Failure;
 use super::output::Output;

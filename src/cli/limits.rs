@@ -1,4 +1,4 @@
-//! `dimcmc limits`: which planets the profiles would show.
+//! `dimcmc limits`: detection limits of the profiles.
 
 use super::output::{Output, fitted, remarks, scene};
 use super::signals::{Signals, before_the_first};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What limits that are interrupted have not come to.
+/// The first result that interrupted limits lack.
 const LIMIT: &str = "limit";
 
 /// Detection limits from injection-recovery tests in period, K and phase
@@ -86,7 +86,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let pool = cluster::pool(global, &signals);
     let shown = Shown::new(global);
     let report = |progress| {
-        // from here on there is something to lose
+        // from here on an interruption would lose results
         if matches!(progress, LimitsProgress::Full { done: 0, .. }) {
             signals.defer();
         }
@@ -104,7 +104,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The options as the library takes them.
+/// The options in the library's form.
 fn options(args: &Args) -> LimitsOptions {
     let Args { min_period_d, max_period_d, without_best, with_best, .. } = *args;
     LimitsOptions {
@@ -126,7 +126,7 @@ fn options(args: &Args) -> LimitsOptions {
     }
 }
 
-/// The bar of what is under way, one after the other.
+/// The bar of the current stage, one after the other.
 struct Shown {
     is_wanted: bool,
     bar: Mutex<(ProgressBar, Instant)>,

@@ -1,4 +1,4 @@
-//! `dimcmc man`: the manual, one page a command.
+//! `dimcmc man`: the manual, one page per command.
 
 use super::output::Output;
 use super::{Failure, console};
@@ -32,7 +32,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// Every page with its file name.
 fn pages() -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let mut whole = super::command();
-    // options of every command belong to its page
+    // adds the options of every command to its page
     whole.build();
     let commands = whole.get_subcommands().filter(|command| command.get_name() != "help" && !command.is_hide_set());
     let named = commands.map(|command| command.clone().display_name(format!("dimcmc-{}", command.get_name())));

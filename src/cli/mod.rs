@@ -1,4 +1,4 @@
-//! The commands, one file each: what is asked, which parts of the library answer, what is printed. No formulas.
+//! The commands, one file each: arguments, calls of the library, output. No formulas.
 //!
 //! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`,
 //! one line each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias =
@@ -57,7 +57,7 @@ struct Cli {
     command: Command,
 }
 
-/// Where `--help` has them.
+/// Heading of these options in `--help`.
 const GENERAL: &str = "General options";
 
 /// Options of every command.
@@ -74,7 +74,7 @@ pub struct Global {
     ranks: cluster::Ranks,
 }
 
-/// More threads than any machine has processors for: the system would take minutes to make them, or fail.
+/// More threads than processors of any machine: the system would take minutes to create them, or fail.
 const MOST_THREADS: usize = 4096;
 
 fn threads(text: &str) -> Result<NonZeroUsize, String> {
@@ -115,10 +115,10 @@ fn command() -> clap::Command {
     groups::grouped(Cli::command())
 }
 
-/// The whole program: reads its `arguments`, the name of the program first, runs the command, prints what went wrong.
-/// The exit code.
+/// The whole program: reads its `arguments`, the name of the program first, runs the command, prints errors. Returns
+/// the exit code.
 ///
-/// Prints help or what is wrong with the arguments, and ends the process, where that is all there is to do.
+/// Prints help or the error in the arguments and exits, if nothing else is to be done.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let matches = match command().try_get_matches_from(arguments) {
         Ok(matches) => matches,
@@ -130,7 +130,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Prints the help that was asked for, or in one line what is wrong with the arguments. The exit code.
+/// Prints the requested help, or the error in the arguments in one line. Returns the exit code.
 fn misused(error: &clap::Error) -> u8 {
     if let Some(failure) = has_moved(error) {
         return console::end(Err(failure));
@@ -141,7 +141,7 @@ fn misused(error: &clap::Error) -> u8 {
     console::end(Err(Failure::input(in_one_line(&error.to_string()))))
 }
 
-/// What clap says on several lines: the error, what was meant, and where help is.
+/// Combines clap's lines: the error, the suggestion, and the hint at help.
 fn in_one_line(text: &str) -> String {
     let (said, usage) = text.split_once("\n\nUsage: ").unwrap_or((text, ""));
     let said = said.split("\n\nFor more").next().unwrap_or_default().trim().trim_start_matches("error: ");
@@ -161,7 +161,7 @@ fn in_one_line(text: &str) -> String {
     format!("{}; see {help} --help", parts.join("; "))
 }
 
-/// Where a command went that is none any more.
+/// The replacement of a command that no longer exists.
 fn has_moved(error: &clap::Error) -> Option<Failure> {
     match error.get(ContextKind::InvalidSubcommand) {
         Some(ContextValue::String(name)) if name == "reproduce" => {

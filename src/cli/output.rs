@@ -1,7 +1,6 @@
-//! Where results go: a folder of their own that is absent or empty, unless the user insists.
+//! The output folder of a command: it must be absent or empty, unless the user insists.
 //!
-//! It is checked before anything is computed and created once there is something to write, so that bad input leaves
-//! nothing behind.
+//! It is checked before anything is computed and created once there are results, so that bad input leaves no files.
 
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
@@ -17,7 +16,7 @@ pub fn scene(config: &Config) -> Result<Scene, SceneError> {
     Scene::new(config)
 }
 
-/// The same with numbers of the star that the config leaves to the profiles.
+/// The same with stellar parameters that the config leaves to the profiles.
 pub fn fitted(global: &Global, scene: Scene) -> Scene {
     let spinner = progress::bar(global, None, "profiles");
     let scene = fitted::fitted(scene, &|what| spinner.set_message(what.to_owned()));
@@ -25,7 +24,7 @@ pub fn fitted(global: &Global, scene: Scene) -> Scene {
     scene
 }
 
-/// Says on standard error which objective configs that name none have; of several, by the first of them.
+/// Reports on standard error the objective of configs that name none; for several, that of the first one.
 pub fn note_objective(configs: &[Config]) {
     let mut unnamed = configs.iter().filter_map(|config| Some((config, config.assumed_objective()?)));
     if let Some((config, text)) = unnamed.next() {
@@ -35,8 +34,8 @@ pub fn note_objective(configs: &[Config]) {
     }
 }
 
-/// Says on standard error what was made of the profiles and light curves of `scene` on reading, for commands whose
-/// report does not.
+/// Prints notes on standard error on the profiles and light curves of `scene` as read, for commands whose report does
+/// not contain them.
 pub fn remarks(scene: &Scene) {
     for remark in &scene.measured.profiles {
         console::note(format_args!("profiles: {remark}"));
@@ -63,7 +62,7 @@ impl Output {
         Output { folder, force }
     }
 
-    /// Whether results may go there.
+    /// Whether results may be written there.
     pub fn check(&self) -> Result<(), Failure> {
         let folder = self.folder.display();
         let wrong = |problem: String| Err(Failure::input(format!("--out {folder}: {problem}")));
@@ -83,7 +82,7 @@ impl Output {
         }
     }
 
-    /// That something can be written into `folder`, by trying: permissions alone do not say it.
+    /// Checks that `folder` is writable, by trying: permissions alone are not sufficient.
     fn is_writable(&self, folder: &Path) -> Result<(), Failure> {
         let probe = folder.join(format!(".dimcmc-{}", std::process::id()));
         let tried = std::fs::create_dir(&probe).and_then(|()| std::fs::remove_dir(&probe));
@@ -93,24 +92,24 @@ impl Output {
         })
     }
 
-    /// Whether what is in the folder is to be replaced: by the user's will, or because it is what a run or a landscape
-    /// has left that ended before its first result.
+    /// Whether the content of the folder may be replaced: on the user's request, or because it is from a run or a
+    /// likelihood grid that ended before its first result.
     pub fn replaces(&self) -> bool {
         let folder = &self.folder;
         self.force || run::is_false_start(folder, true) || grid_scan::is_false_start(folder, true)
     }
 
-    /// Whether a run or a landscape ended there before it was said what it was begun with, so that it cannot go on.
+    /// Whether a run or a likelihood grid ended there before its header was written, so that it cannot be resumed.
     pub fn cannot_go_on(&self) -> bool {
         run::is_false_start(&self.folder, false) || grid_scan::is_false_start(&self.folder, false)
     }
 
-    /// That nothing which the command has read is replaced by what it `writes`, whatever the user says.
+    /// Checks that nothing which the command has read is replaced by a file that it `writes`, even on request.
     pub fn spare(&self, read: &[PathBuf], writes: impl Fn(&str) -> bool) -> Result<(), Failure> {
         self.spare_below("", read, writes)
     }
 
-    /// The same of files in a folder `below` it.
+    /// The same for files in a folder `below` it.
     pub fn spare_below(&self, below: &str, read: &[PathBuf], writes: impl Fn(&str) -> bool) -> Result<(), Failure> {
         let is_written = |file: &Path| file.file_name().is_some_and(|name| writes(&name.to_string_lossy()));
         let mut targets =
@@ -126,7 +125,7 @@ impl Output {
         &self.folder
     }
 
-    /// The folder, created if need be.
+    /// The folder, created if necessary.
     pub fn create(&self) -> Result<Claimed, Failure> {
         self.check()?;
         let failed = |e| Failure::failed(format!("--out {}: cannot be created: {e}", self.folder.display()));
@@ -135,7 +134,7 @@ impl Output {
     }
 }
 
-/// The folder that is there, of those on the way to one that may not be.
+/// The deepest existing folder of the path.
 fn existing(folder: &Path) -> &Path {
     let mut way = folder.ancestors().filter(|folder| !folder.as_os_str().is_empty());
     way.find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
@@ -158,7 +157,7 @@ impl ConfigFile {
         &self.path
     }
 
-    /// Whether the config, and another file that comes with it, may be written.
+    /// Whether the config, and another file written with it, may be written.
     pub fn check(&self, other: Option<&Path>) -> Result<(), Failure> {
         let out = self.path.display();
         let wrong = |problem: String| Err(Failure::input(format!("--out {out}: {problem}")));
@@ -177,13 +176,13 @@ impl ConfigFile {
         }
     }
 
-    /// The same once more when they are there to be written, no other process being about to while the lock lives.
+    /// The same again before writing, with a lock against other processes while it lives.
     pub fn claim(&self, other: Option<&Path>) -> Result<Claimed, Failure> {
         Claimed::folder(folder_of(&self.path), || self.check(other))
     }
 
-    /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever
-    /// the user says.
+    /// Checks that neither the config nor another file written with it replaces one that the command has `read`, even
+    /// on request.
     pub fn spare(&self, read: &[PathBuf], other: Option<&Path>) -> Result<(), Failure> {
         let targets = [Some(self.path.as_path()), other];
         match read.iter().find(|file| targets.into_iter().flatten().any(|target| is_same(file, target))) {
@@ -192,7 +191,7 @@ impl ConfigFile {
         }
     }
 
-    /// `file` as a config at this place names it: relative to its folder, or from the root where the two share none.
+    /// `file` as a path in a config at this place: relative to its folder, or absolute where the two share no root.
     pub fn relative(&self, file: &Path) -> Result<PathBuf, Failure> {
         let whole = |path: &Path| {
             path.canonicalize().map_err(|e| Failure::system(&e, format!("{}: cannot read: {e}", path.display())))
@@ -207,14 +206,14 @@ impl ConfigFile {
         Ok(up.map(PathBuf::from).chain(file.components().skip(shared).map(|c| PathBuf::from(c.as_os_str()))).collect())
     }
 
-    /// The JSON Schema, if it lies beside the config under the name it ships with.
+    /// The JSON Schema, if it is beside the config under its usual name.
     pub fn schema(&self) -> Option<String> {
         const NAME: &str = "dimcmc.schema.json";
         folder_of(&self.path).join(NAME).is_file().then(|| NAME.to_owned())
     }
 }
 
-/// Whether two paths lead to the same file that is there, or its name stands in the same folder.
+/// Whether two paths lead to the same existing file, or have its name in the same folder.
 fn is_same(file: &Path, other: &Path) -> bool {
     let whole = |path: &Path| path.canonicalize().ok();
     let named = |path: &Path| Some(folder_of(path).canonicalize().ok()?.join(name_of(path)));
@@ -231,7 +230,7 @@ fn read_too(out: &Path, file: &Path) -> Failure {
     Failure::input(format!("--out {out}: {file} would be replaced, which the command reads; give another name"))
 }
 
-/// What exists of the path, if that is no folder.
+/// The existing part of the path, if that is not a folder.
 fn obstacle(folder: &Path) -> Option<&Path> {
     folder.ancestors().find(|parent| parent.exists()).filter(|parent| !parent.is_dir())
 }

@@ -1,4 +1,4 @@
-//! `dimcmc plan`: which planets profiles would show that are not yet taken.
+//! `dimcmc plan`: expected detection limits of planned profiles.
 
 use super::output::Output;
 use super::signals::{RESULT, Signals};

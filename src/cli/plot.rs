@@ -1,4 +1,4 @@
-//! `dimcmc plot`: figures of whatever a folder holds.
+//! `dimcmc plot`: figures of the results in a folder.
 
 use super::output::Output;
 use super::report_lines::Report;

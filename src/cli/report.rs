@@ -56,7 +56,7 @@ fn check(file: &Path, force: bool) -> Result<(), Failure> {
             file.display()
         )));
     }
-    // nothing that a page is made of
+    // an existing file that is not such a page
     if file.exists() && !report::is_page(file) {
         return Err(Failure::input(format!(
             "--out {}: is there already, and no report: it is not replaced",

@@ -1,4 +1,4 @@
-//! Short results on stdout, a label and a value a line.
+//! Short results on stdout, one label and value per line.
 
 use super::console;
 use crate::numerics::text::escaped;
@@ -18,7 +18,7 @@ impl Report {
         self
     }
 
-    /// Adds a line that names what was written.
+    /// Adds a line that names the written files.
     pub fn written(self, folder: &Path, files: impl Display) -> Self {
         self.line("written", format!("{}: {files}", folder.display()))
     }

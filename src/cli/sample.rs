@@ -125,7 +125,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
 /// Chains that take longer are announced.
 const WORTH_SAYING: Duration = Duration::from_secs(20);
 
-/// What a chain will cost, in words.
+/// The expected cost of a chain, as text.
 fn words(cost: &Cost) -> String {
     let Cost { steps, is_limit, evaluations, of_a_step } = *cost;
     let time = HumanDuration(cost.time());
@@ -140,7 +140,7 @@ fn words(cost: &Cost) -> String {
 /// Divisions of the bar.
 const BAR: u64 = 1000;
 
-/// Shows how far a chain has come.
+/// Shows the progress of a chain.
 fn show(bar: &ProgressBar, pace: &Pace) {
     bar.set_position((BAR as f64 * pace.step as f64 / pace.end.max(1.0)) as u64);
     let convergence = pace.convergence.as_ref().map(|words| format!(", {words}")).unwrap_or_default();
@@ -148,7 +148,7 @@ fn show(bar: &ProgressBar, pace: &Pace) {
         "{}/{}, {}{:#} left, {:.0} rec/s, acceptance {:.2}{convergence}",
         pace.step,
         pace.last_step,
-        // until the goals are in sight, the step limit is all that is known
+        // until the goals are in sight, only the step limit is known
         if pace.in_sight { "" } else { "at most " },
         HumanDuration(pace.left),
         pace.rate,

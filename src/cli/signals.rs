@@ -1,7 +1,8 @@
-//! Ctrl-C, SIGTERM and SIGUSR1: at once where there is nothing to lose, after the reconstructions under way where there
-//! is.
+//! Ctrl-C, SIGTERM and SIGUSR1: they stop a command at once where no results would be lost, and otherwise after the
+//! current reconstructions.
 //!
-//! SIGTERM and SIGUSR1 come from a scheduler whose time is up, and the exit code says that the same command goes on.
+//! SIGTERM and SIGUSR1 come from a scheduler at the end of the allocated time, and the exit code tells that the same
+//! command resumes.
 
 use super::failure::{INTERRUPTED, RESUME};
 use super::{Failure, console};
@@ -10,13 +11,13 @@ use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What commands have not come to whose results are written in one go.
+/// The missing result of commands that write everything at once.
 pub const RESULT: &str = "result";
 
-/// What is done before a signal ends the program.
+/// Cleanup before a signal ends the program.
 type Undo = Box<dyn FnOnce() + Send>;
 
-/// What signals do from now on.
+/// The handling of signals from now on.
 pub struct Signals {
     stop: Arc<AtomicBool>,
     deferred: Arc<AtomicBool>,
@@ -26,8 +27,8 @@ pub struct Signals {
 
 impl Signals {
     /// Catches the signals: until [`Signals::defer`], the first one ends the program with a message; after it, the
-    /// first one sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first
-    /// `unit`. What comes before this is the system's: call it first.
+    /// first one sets the flag, and a second Ctrl-C ends the program. The message names the result that has not begun:
+    /// the first `unit`. Before this call the system handles signals: call it first.
     pub fn catch(unit: &'static str) -> Result<Self, Failure> {
         let signals = Signals {
             stop: Arc::default(),
@@ -45,7 +46,7 @@ impl Signals {
                 if !by_hand {
                     code.store(RESUME, Ordering::SeqCst);
                 }
-                // held to the end: what is not made yet is not made any more
+                // held to the end: nothing is created after this
                 let mut undo = undo.lock().unwrap_or_else(PoisonError::into_inner);
                 if !deferred.load(Ordering::SeqCst) {
                     if let Some(undo) = undo.take() {
@@ -63,7 +64,7 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Catches the signals and leaves it at that: somebody else decides when to stop.
+    /// Catches the signals without an effect: another process decides when to stop.
     #[cfg(feature = "mpi")]
     pub fn ignore() -> Result<Self, Failure> {
         let signals = Signals::catch("answer")?;
@@ -71,7 +72,8 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Makes what is to be undone before a signal ends the program, until [`Signals::defer`]; a signal meanwhile waits.
+    /// Creates an object that is removed again if a signal ends the program before [`Signals::defer`]; a signal
+    /// meanwhile waits.
     ///
     /// # Errors
     /// Those of `make`.
@@ -86,24 +88,24 @@ impl Signals {
         Ok(made)
     }
 
-    /// From now on there is something to lose.
+    /// From now on an interruption would lose results.
     pub fn defer(&self) {
         let _held = self.undo.lock().unwrap_or_else(PoisonError::into_inner);
         self.deferred.store(true, Ordering::SeqCst);
     }
 
-    /// Set once a signal has come.
+    /// Set once a signal has arrived.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.stop)
     }
 
-    /// That a signal ended the command, with the exit code that belongs to it.
+    /// The failure by a signal, with its exit code.
     pub fn interrupted(&self, message: impl std::fmt::Display) -> Failure {
         Failure::interrupted(self.code.load(Ordering::SeqCst), message)
     }
 }
 
-/// The signals that come, one after the other, waited for.
+/// An iterator that waits for the signals.
 #[cfg(unix)]
 fn incoming() -> io::Result<impl Iterator<Item = i32> + Send> {
     use signal_hook::consts::{SIGTERM, SIGUSR1};
@@ -131,7 +133,7 @@ fn incoming() -> io::Result<impl Iterator<Item = i32> + Send> {
     }))
 }
 
-/// That nothing has begun yet.
+/// The message that nothing has begun yet.
 pub fn before_the_first(unit: &str) -> String {
     format!("interrupted before the first {unit}; nothing was written")
 }

@@ -1,11 +1,11 @@
-//! What a command printed of the results in a folder, from its files alone.
+//! The printed output of a command, from the files of its folder alone.
 
 use super::plot::PlotError;
 use crate::runs::grid_scan::{self, GridScanError};
 use crate::runs::{blind_search, comparison, limits, optimum, origin, plan, survey};
 use std::path::Path;
 
-/// What was printed when `file` was written into `folder`; `None` where the file does not hold all of it.
+/// The output when `file` was written into `folder`; `None` where the file does not contain all of it.
 ///
 /// # Errors
 /// [`PlotError`]: files that are missing or wrong.

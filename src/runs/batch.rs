@@ -1,6 +1,6 @@
-//! Many stars: the chain of every config of a list, each in a folder of its own, several at once.
+//! Many stars: the chain of every config of a list, each in its own folder, several at once.
 //!
-//! A star that is done is left alone, one that was stopped goes on, and one that fails stops no other.
+//! A star that is done is skipped, one that was interrupted is resumed, and one that fails stops no other.
 
 use crate::data::io::FileError;
 use crate::data::io::atomic::write_json;
@@ -19,32 +19,32 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Name of the file with what came of all of them.
+/// Name of the file with all results.
 pub const FILE: &str = "batch.json";
 
-/// Name of the file that is locked while a batch is at work, so that no other one writes its table over.
+/// Name of the file that is locked while a batch is running, so that no other one overwrites its table.
 pub const LOCK: &str = ".batch.lock";
 
 /// A star of a list.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Star {
-    /// The config's name without its extension, which is that of its folder.
+    /// The config's name without its extension, which is also the name of its folder.
     pub name: String,
     /// Its config.
     pub config: PathBuf,
-    /// Where its run is kept.
+    /// Folder of its run.
     pub folder: PathBuf,
 }
 
-/// What came of a star.
+/// The result for a star.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum End {
-    /// It has a chain, as long as its config asks for, and a summary.
+    /// It has a chain of the length that its config requires, and a summary.
     Sampled,
-    /// It was stopped; the same command goes on.
+    /// It was interrupted; the same command resumes it.
     Interrupted,
-    /// It has no chain, and this is why.
+    /// It has no chain, for this reason.
     Failed(String),
 }
 
@@ -74,8 +74,8 @@ pub fn read_list(path: &Path, out: &Path) -> Result<Vec<Star>, FileError> {
     if stars.is_empty() { Err(FileError::of(path, "names no config")) } else { Ok(stars) }
 }
 
-/// Samples all stars, as many at once as the pool is large; `done` is told of each that ends on this machine. What came
-/// of them, in order; of those that were not begun when the pool was told to stop, that they were interrupted.
+/// Samples all stars, as many at once as the pool is large; `done` is called for each that ends on this machine.
+/// Returns the results, in order; stars that were not begun when the pool was told to stop count as interrupted.
 pub fn sample_all(stars: &[Star], pool: &Pool, done: &(dyn Fn() + Sync)) -> Vec<End> {
     let stop = pool.shared_stop();
     let here = |star: &Star| {
@@ -88,7 +88,7 @@ pub fn sample_all(stars: &[Star], pool: &Pool, done: &(dyn Fn() + Sync)) -> Vec<
     ends
 }
 
-/// Samples a star, or goes on with it.
+/// Samples a star, or resumes it.
 pub fn sample(star: &Star, pool: &Pool) -> End {
     match tried(star, pool) {
         Ok(end) => end,
@@ -103,7 +103,7 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
     let mut scene = Scene::load(&star.config)?;
     scene.settings.require_free()?;
     let folder = &star.folder;
-    // a chain without a line is one that was killed as it began
+    // a chain without a line was killed at its beginning
     let has_lines = std::fs::metadata(folder.join(CHAIN)).is_ok_and(|chain| chain.len() > 0);
     let is_begun = folder.join(manifest::FILE).exists() || has_lines;
     let mut run = if is_begun {
@@ -135,11 +135,11 @@ pub struct Row {
     pub name: String,
     /// Its config.
     pub config: PathBuf,
-    /// What came of it.
+    /// The result.
     pub end: End,
     /// Whether its chain has converged.
     pub converged: Option<bool>,
-    /// What is said of a planet.
+    /// The verdict on a planet.
     #[serde(default)]
     pub verdict: Option<Verdict>,
     /// Evaluations of its chain.
@@ -148,7 +148,7 @@ pub struct Row {
     pub parameters: BTreeMap<String, ParameterSummary>,
 }
 
-/// What came of the stars, with the numbers in their summaries.
+/// The results for the stars, with the values in their summaries.
 pub fn rows(stars: &[Star], ends: &[End]) -> Vec<Row> {
     let row = |(star, end): (&Star, &End)| {
         let summary =
@@ -183,10 +183,10 @@ impl Answer for End {
     }
 }
 
-/// How a rank answers what a brief is about.
+/// The function with which a rank answers the questions on a brief.
 ///
 /// # Errors
-/// A density that cannot be had there.
+/// A density that cannot be built there.
 #[cfg(feature = "mpi")]
 pub fn learn(brief: &[u8]) -> Result<crate::runs::cluster::Answer<'static>, crate::runs::pool::TaskError> {
     Ok(match Brief::from_bytes(brief).expect("a rank of this very program asks") {

@@ -31,7 +31,7 @@ pub struct LimitsOptions {
     pub phases: usize,
     /// Number of orbits near the limit to pass through the full pipeline.
     pub full: usize,
-    /// What becomes of the best orbit of the observed profiles.
+    /// The treatment of the best orbit of the observed profiles.
     pub best: BestOrbit,
     /// Whether free parameters are fixed at the config's values.
     pub fixed: bool,
@@ -59,7 +59,7 @@ impl Default for LimitsOptions {
     }
 }
 
-/// What is under way.
+/// The current stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitsProgress {
     /// The planet-free map, and its search.
@@ -89,7 +89,7 @@ pub enum LimitsError {
     /// No semi-amplitude is detectable.
     #[error("{}: {Unbounded}", .0.display())]
     Unbounded(PathBuf),
-    /// Semi-amplitudes that make no range.
+    /// Semi-amplitudes that are not a range.
     #[error(
         "--min-k-kms, --max-k-kms: {min} to {max} km/s is no range, both must be above 0, the first below the second"
     )]
@@ -104,7 +104,7 @@ pub enum LimitsError {
     Interrupted,
 }
 
-/// Limits with the orbits that they rest on.
+/// Limits with the underlying injected orbits.
 #[derive(Clone, Debug)]
 pub struct DetectionLimits {
     cells: Vec<Cell>,
@@ -113,8 +113,8 @@ pub struct DetectionLimits {
 }
 
 impl DetectionLimits {
-    /// The limits of the profiles in `scene`. `report` is told what is under way, from any thread; orbits of the full
-    /// pipeline are not begun once `pool` is told to stop.
+    /// The limits of the profiles in `scene`. `report` is called with the current stage, from any thread; orbits of the
+    /// full pipeline are not begun once `pool` is told to stop.
     ///
     /// # Errors
     /// [`LimitsError`].
@@ -153,13 +153,13 @@ impl DetectionLimits {
         self.file.write(&self.cells, self.rotation_period_d, folder)
     }
 
-    /// What is printed.
+    /// The printed output.
     pub fn table(&self) -> String {
         self.file.table()
     }
 }
 
-/// How orbits are looked for.
+/// The settings of the search for orbits.
 fn settings(scene: &Scene, options: &LimitsOptions) -> Result<LimitSettings, LimitsError> {
     let LimitsOptions { range, best, fixed, draws, seed, .. } = *options;
     let search = BlindSearchOptions { periods: range, fixed, draws, seed, ..BlindSearchOptions::default() };

@@ -1,9 +1,9 @@
-//! What the profiles say of star, events and rotation period ([`Scene::fitted`]), kept from one command to the next:
-//! `map`, `periodogram`, `limits` and `sample` of one config begin with the same fit, which takes longer than a map.
+//! The fit of star, events and rotation period to the profiles ([`Scene::fitted`]), cached between commands: `map`,
+//! `periodogram`, `limits` and `sample` of one config begin with the same fit, which takes longer than a map.
 //!
 //! It is a file in the user's cache, whose name is a fingerprint of config, observations, program and kind of
-//! processor: what was computed by another program or of other data is never used. Nothing depends on it but time: a
-//! cache that cannot be read or written is no error.
+//! processor: results of another program or of other data are never used. Only computing time depends on it: a cache
+//! that cannot be read or written is no error.
 
 use crate::data::io::atomic::write_json;
 use crate::data::io::provenance::Measured;
@@ -13,17 +13,17 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// Variable of the environment that names another folder for it, or is [`OFF`].
+/// Environment variable with another folder for it, or [`OFF`].
 pub const VARIABLE: &str = "DIMCMC_CACHE";
 
-/// Its value where nothing is kept.
+/// Its value that disables the cache.
 pub const OFF: &str = "off";
 
-/// What is older is removed.
+/// Older files are removed.
 const LONGEST: Duration = Duration::from_secs(30 * 24 * 3600);
 
-/// The same scene with numbers of the star that the config leaves to the profiles, fitted or kept; `report` is told
-/// what is under way.
+/// The same scene with stellar parameters that the config leaves to the profiles, fitted or from the cache; `report` is
+/// called with the current stage.
 #[must_use]
 pub fn fitted(scene: Scene, report: &dyn Fn(&str)) -> Scene {
     let Some(path) = folder().and_then(|folder| Some(folder.join(name(&scene)?))) else {
@@ -39,7 +39,7 @@ pub fn fitted(scene: Scene, report: &dyn Fn(&str)) -> Scene {
     scene
 }
 
-/// Where it is kept.
+/// The folder of the cache.
 fn folder() -> Option<PathBuf> {
     let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     match of(VARIABLE) {
@@ -52,7 +52,7 @@ fn folder() -> Option<PathBuf> {
     }
 }
 
-/// The file of `scene`; `None` where the program does not know itself.
+/// The file of `scene`; `None` where the program cannot be fingerprinted.
 fn name(scene: &Scene) -> Option<String> {
     let program = std::fs::metadata(std::env::current_exe().ok()?).ok()?;
     let built = program.modified().ok()?.duration_since(SystemTime::UNIX_EPOCH).ok()?;
@@ -85,7 +85,7 @@ fn remove_old(folder: &Path) {
     };
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         if is_old(&entry.path()) {
-            // another process may have been quicker
+            // another process may have been faster
             let _ = std::fs::remove_file(entry.path());
         }
     }

@@ -1,8 +1,8 @@
-//! A landscape on disk: begun afresh, or gone on with to the same bytes (`docs/method.md` section 6).
+//! A likelihood grid on disk: begun, or resumed to the same bytes (`docs/method.md` section 6).
 //!
 //! The reference is that of `sample`: the best parameters by `search` over the axes. Nodes are reconstructed in
-//! batches, in the order of the grid, so that the file does not depend on the number of threads, and a kill loses the
-//! batch under way.
+//! batches, in the order of the grid, so that the file does not depend on the number of threads, and a kill loses only
+//! the current batch.
 
 use crate::data::config::{GridSettings, MOST_NODES};
 use crate::data::io::atomic::{WriteError, clear_abandoned, write_json};
@@ -23,19 +23,19 @@ use crate::surface::density::Density;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Name of the file that says what a landscape was begun with.
+/// Name of the header file of a likelihood grid.
 pub const HEADER: &str = "landscape.json";
 
 /// Name of the file with its nodes.
 pub const NODES: &str = "landscape.jsonl";
 
-/// Name of the file with its paraboloid, where the landscape is whole.
+/// Name of the file with its paraboloid, where the likelihood grid is complete.
 pub const PARABOLOID: &str = "paraboloid.json";
 
-/// Nodes of a batch for each reconstruction under way: enough that threads or ranks seldom wait for the slowest node.
+/// Nodes per batch for each concurrent reconstruction: enough that threads or ranks seldom wait for the slowest node.
 const BATCH_EACH: usize = 8;
 
-/// Whether nothing but an empty file of nodes is in `folder`, and with `header` perhaps that: such a landscape may
+/// Whether `folder` contains only an empty file of nodes, and the header if `header` is set: such a likelihood grid may
 /// begin again.
 pub fn is_false_start(folder: &Path, header: bool) -> bool {
     lines::is_false_start(folder, header.then_some(HEADER), NODES)
@@ -47,9 +47,9 @@ pub struct Header {
     /// Config, data, program and reference.
     #[serde(flatten)]
     pub origin: Origin,
-    /// Where the nodes are.
+    /// The nodes of the grid.
     pub grid: Grid,
-    /// Names of the numbers beside ln L at each.
+    /// Names of the other values at each node.
     #[serde(default = "likelihood_numbers")]
     pub numbers: Vec<String>,
 }
@@ -61,21 +61,21 @@ fn likelihood_numbers() -> Vec<String> {
 impl Saved for Header {}
 
 impl Header {
-    /// What to bear in mind of the landscape.
+    /// Notes on the likelihood grid.
     pub fn notes(&self) -> Vec<String> {
         let axes: Vec<String> = self.grid.names().map(str::to_owned).collect();
         self.origin.reference.warnings(&axes)
     }
 
-    /// What it was begun with, and the names of its parameters.
+    /// Its origin, and the names of its parameters.
     fn parts(&self) -> (&Origin, Vec<String>) {
         (&self.origin, self.grid.names().map(str::to_owned).collect())
     }
 
-    /// Reads that of the landscape in `folder`.
+    /// Reads the header of the likelihood grid in `folder`.
     ///
     /// # Errors
-    /// A folder without one, one that cannot be read, or says what does not belong together.
+    /// A folder without one, or one that cannot be read or is inconsistent.
     pub fn read(folder: &Path) -> Result<Self, OriginError> {
         let header: Header = origin::read_header(folder, HEADER, Header::parts)?;
         let nodes = header.grid.axes.iter().try_fold(1usize, |all, axis| all.checked_mul(axis.nodes));
@@ -92,11 +92,11 @@ impl Header {
     }
 }
 
-/// A landscape with its nodes so far.
+/// A likelihood grid with its nodes so far.
 pub struct GridScan {
-    /// What it was begun with.
+    /// Its header.
     pub header: Header,
-    /// What is evaluated at the nodes, without its prior; of a whole landscape without its warm starts.
+    /// The density at the nodes, without its prior; for a complete likelihood grid without its warm starts.
     posterior: Density,
     /// The nodes so far.
     pub landscape: Landscape,
@@ -104,10 +104,10 @@ pub struct GridScan {
     file: LineFile,
 }
 
-/// Why a landscape cannot begin, or go on.
+/// Why a likelihood grid cannot begin or be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum GridScanError {
-    /// What it was begun with is missing, wrong, or not what is there now.
+    /// Its header is missing, wrong, or does not match.
     #[error(transparent)]
     Origin(#[from] OriginError),
     /// The nodes on disk are wrong or locked, or cannot be written.
@@ -116,29 +116,29 @@ pub enum GridScanError {
     /// The header cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The landscape refused a node: a fault of the program.
+    /// The likelihood grid refused a node: a bug.
     #[error(transparent)]
     Landscape(#[from] LandscapeError),
 }
 
 impl GridScan {
-    /// Whether `folder` holds nothing but a landscape that ended before its first node: another one may replace it.
+    /// Whether `folder` contains only a likelihood grid that ended before its first node: another one may replace it.
     pub fn is_false_start(folder: &Path) -> bool {
         is_false_start(folder, true)
     }
 
-    /// Claims `folder`, which is made, for a landscape whose reference is yet to be found: others are refused from now
-    /// on.
+    /// Creates and claims `folder` for a likelihood grid whose reference is not known yet: from now on others are
+    /// refused.
     ///
     /// # Errors
-    /// A folder that holds a landscape already (unless `replace`), in which another process begins one, or that cannot
-    /// be written.
+    /// A folder that contains a likelihood grid already (unless `replace`), in which another process begins one, or
+    /// that cannot be written.
     pub fn claim(folder: &Path, replace: bool) -> Result<Claim, GridScanError> {
         Ok(Claim::of(&folder.join(NODES), replace)?)
     }
 
-    /// Begins the landscape of `plan` in `folder`, which was claimed, with the reference that a search over its axes
-    /// `found`.
+    /// Begins the likelihood grid of `plan` in `folder`, which was claimed, with the reference that a search over its
+    /// axes `found`.
     ///
     /// # Errors
     /// [`GridScanError`]: files that cannot be written.
@@ -152,7 +152,7 @@ impl GridScan {
         let grid = &plan.grid;
         let numbers = found.posterior.likelihood_numbers().iter().map(|name| (*name).to_owned()).collect();
         let header = Header { origin: Origin::of(scene, &found), grid: grid.clone(), numbers };
-        // the nodes first: whoever holds them may write the header
+        // the nodes first: a lock on them is required for writing the header
         let file = claim.begin()?;
         let path = folder.join(PARABOLOID);
         match std::fs::remove_file(&path) {
@@ -164,10 +164,10 @@ impl GridScan {
         Ok(GridScan::new(scene, header, found.posterior, landscape, file))
     }
 
-    /// Goes on with the landscape of `plan` in `folder`.
+    /// Resumes the likelihood grid of `plan` in `folder`.
     ///
     /// # Errors
-    /// [`GridScanError`]: no landscape there, changed config, grid or data, broken lines.
+    /// [`GridScanError`]: no likelihood grid there, changed config, grid or data, broken lines.
     pub fn resume(scene: &Scene, plan: &GridSettings, folder: &Path) -> Result<Self, GridScanError> {
         clear_abandoned(folder);
         let header = Header::read(folder)?;
@@ -180,10 +180,10 @@ impl GridScan {
         Ok(GridScan::new(scene, header, posterior, landscape, file))
     }
 
-    /// With warm starts where nodes far from the reference are worth them.
+    /// With warm starts where they pay off for nodes far from the reference.
     fn new(scene: &Scene, header: Header, posterior: Density, landscape: Landscape, file: LineFile) -> Self {
         let grid = landscape.grid();
-        // all nodes, whatever is left of them: a landscape that goes on has the warm starts that it began with
+        // for all nodes, however many remain: a resumed likelihood grid has its original warm starts
         let nodes = if landscape.is_whole() { 0 } else { grid.len() };
         let thetas: Vec<Vec<f64>> = (0..nodes).map(|index| grid.theta(index)).collect();
         let posterior = posterior.with_warm_starts_for(&thetas, nodes);
@@ -193,12 +193,13 @@ impl GridScan {
         GridScan { header, posterior, landscape, task, file }
     }
 
-    /// Images, besides the reference, that nodes start from; none where no node is left.
+    /// Images, besides the reference, that nodes start from; none where no node remains.
     pub fn warm_starts(&self) -> usize {
         self.posterior.warm_starts().len()
     }
 
-    /// Fits the paraboloid of a whole landscape by `rule` and writes it into `folder`; the tables of both.
+    /// Fits the paraboloid of a complete likelihood grid by `rule` and writes it into `folder`; returns the tables of
+    /// both.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -209,8 +210,8 @@ impl GridScan {
         Ok(tables(&self.header, &self.landscape, &found))
     }
 
-    /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one,
-    /// and of the last what was finished in time. Returns whether the landscape is whole.
+    /// Reconstructs until the likelihood grid is complete or `pool` is told to stop; every batch is on disk before the
+    /// next one, and the finished part of the last one. Returns whether the likelihood grid is complete.
     ///
     /// # Errors
     /// Nodes that cannot be written.
@@ -235,7 +236,7 @@ impl GridScan {
     }
 }
 
-/// What was printed of the landscape in `folder`, whole or not yet.
+/// The printed output for the likelihood grid in `folder`, complete or not.
 ///
 /// # Errors
 /// A folder without one, or files that are broken.
@@ -252,13 +253,13 @@ pub fn printed(folder: &Path) -> Result<String, GridScanError> {
     Ok(text + &header.notes().iter().map(|note| format!("note: {note}\n")).collect::<String>())
 }
 
-/// A landscape and its paraboloid as text.
+/// A likelihood grid and its paraboloid as text.
 fn tables(header: &Header, landscape: &Landscape, found: &Result<Paraboloid, Undefined>) -> String {
     let truth = header.origin.truth.as_ref();
     table(landscape, truth) + &paraboloid_table(found, landscape.grid(), truth)
 }
 
-/// The first axis that is not the same.
+/// The first axis that differs.
 fn change(then: &Grid, now: &Grid) -> Option<String> {
     let axis = |grid: &Grid, name: &str| grid.axes.iter().find(|axis| axis.name == name).cloned();
     let name = now.names().chain(then.names()).find(|name| axis(then, name) != axis(now, name))?;

@@ -1,5 +1,5 @@
-//! What `inject` makes: the profiles of a scene with the orbit of a planet in them, the config for these, and the truth
-//! behind them.
+//! The results of `inject`: the profiles of a scene with the orbit of a planet in them, the config for these, and the
+//! true parameters.
 
 use crate::data::calibrated::of_sets;
 use crate::data::config::{self, DataSetSettings, Settings};
@@ -30,19 +30,20 @@ pub struct Injected<'a> {
 /// Why nothing was injected.
 #[derive(Debug, thiserror::Error)]
 pub enum InjectError {
-    /// An orbit that makes no sense with these profiles.
+    /// An orbit that is invalid for these profiles.
     #[error("--{option}: must be {must}, not {value}")]
     Orbit {
-        /// The option at fault.
+        /// The invalid option.
         option: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Its requirement.
         must: String,
     },
 }
 
-/// Where the profiles of a data set go, below the folder of all: there for one, else in a folder of its name.
+/// Folder of the profiles of a data set, relative to the output: the output folder itself for one set, otherwise a
+/// folder of its name.
 pub fn folder_of(scene: &Scene, set: &DataSetSettings) -> String {
     if scene.settings.sets.len() > 1 { format!("{}/", set.name) } else { String::new() }
 }
@@ -62,7 +63,7 @@ impl<'a> Injected<'a> {
         Ok(Injected { scene, orbit, sets, velocity_kms })
     }
 
-    /// Writes `observations.txt`, the profiles that it lists and `truth.json` into `folder`, which must exist, of
+    /// Writes `observations.txt`, the profiles that it lists and `truth.json` into `folder`, which must exist, for
     /// several data sets each into a folder of its name there; and `config.json`.
     ///
     /// # Errors
@@ -92,7 +93,7 @@ impl<'a> Injected<'a> {
         atomic::write(&folder.join(CONFIG), config::to_text(&config).as_bytes())
     }
 
-    /// What was made, label and text a line.
+    /// The results, one label and text per line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let Injected { orbit, velocity_kms, .. } = self;
         let largest = velocity_kms.iter().map(|v| v.abs()).fold(0.0, f64::max);
@@ -105,7 +106,7 @@ impl<'a> Injected<'a> {
     }
 }
 
-/// The orbit, which leaves the line in the data.
+/// The orbit, if it leaves the line within the data.
 fn checked(orbit: Orbit, whole: &Observations) -> Result<Orbit, InjectError> {
     let Orbit { k_kms, porb_over_prot, phi } = orbit;
     let width_kms = |p: &Profile| p.intensity.len() as f64 * p.step_kms;
@@ -123,7 +124,7 @@ fn checked(orbit: Orbit, whole: &Observations) -> Result<Orbit, InjectError> {
     }
 }
 
-/// Priors that do not hold the orbit.
+/// Priors that exclude the orbit.
 fn outside(settings: &Settings, orbit: &Orbit) -> Vec<String> {
     let value = |parameter| match parameter {
         Parameter::K => Some(orbit.k_kms),

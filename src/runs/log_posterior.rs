@@ -1,4 +1,4 @@
-//! The density that a chain samples, by itself: for samplers other than this program's.
+//! The density of a chain, for other samplers than this program's.
 
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// The log-posterior of the free parameters of a [`Scene`], spots marginalised out: what a [`Run`](crate::Run)
-/// samples, to the bit.
+/// The log-posterior of the free parameters of a [`Scene`], spots marginalised out: the density that a
+/// [`Run`](crate::Run) samples, to the bit.
 ///
 /// Vectors are in the order of [`LogDensity::names`] and in the units of these names.
 pub struct LogPosterior {
@@ -21,7 +21,7 @@ pub struct LogPosterior {
 }
 
 impl LogPosterior {
-    /// That of `scene` with the reference that a search `found` ([`Scene::optimise`]).
+    /// The density of `scene` with the reference that a search `found` ([`Scene::optimise`]).
     ///
     /// # Errors
     /// A config without a free parameter, and unresolved spots that have no size.
@@ -32,11 +32,11 @@ impl LogPosterior {
         Ok(LogPosterior { target, origin })
     }
 
-    /// The same again, from what [`LogPosterior::origin`] said and the `scene` of the same config and observations;
-    /// without a search. `place` is what errors name.
+    /// The same, rebuilt from [`LogPosterior::origin`] and the `scene` of the same config and observations; without a
+    /// search. `place` is the name in errors.
     ///
     /// # Errors
-    /// Another config or other observations, and a reference that comes out differently here.
+    /// Another config or other observations, and a reference that differs here.
     pub fn again(scene: &Scene, origin: &str, place: &Path) -> Result<Self, RunError> {
         let origin: Origin =
             serde_json::from_str(origin).map_err(|source| OriginError::Json { path: place.into(), source })?;
@@ -46,7 +46,7 @@ impl LogPosterior {
         Ok(LogPosterior { target, origin })
     }
 
-    /// Config, fingerprint of the data and reference as JSON: what another process needs beside config and data.
+    /// Config, fingerprint of the data and reference as JSON: the input of another process beside config and data.
     pub fn origin(&self) -> String {
         serde_json::to_string(&self.origin).expect("plain data")
     }
@@ -56,13 +56,13 @@ impl LogPosterior {
         self.space().log_prior(theta)
     }
 
-    /// The parameters at `unit`, a point of the unit cube: what nested samplers call a prior transform.
+    /// The parameters at `unit`, a point of the unit cube: the prior transform of nested samplers.
     pub fn prior_transform(&self, unit: &[f64]) -> Vec<f64> {
         let free = self.space().free();
         let mut theta: Vec<f64> = free.iter().zip(unit).map(|(free, u)| free.prior.quantile(*u)).collect();
         for planet in &Elements::PLANETS {
             let place = |p: Parameter| free.iter().position(|f| f.parameter == p);
-            // of two coordinates in one disc the second is even along the chord at the first
+            // of two coordinates in one disc the second is uniform along the chord at the first
             if let [Some(x), Some(y)] = planet.shape.map(place)
                 && let Prior::Disc { max_eccentricity } = free[x].prior
             {
@@ -72,8 +72,8 @@ impl LogPosterior {
         theta
     }
 
-    /// Log-probabilities of the vectors that stand one after the other in `thetas`, on the threads of rayon's current
-    /// pool; `None` where `stop` was set meanwhile.
+    /// Log-probabilities of the vectors that follow each other in `thetas`, on the threads of rayon's current pool;
+    /// `None` where `stop` was set meanwhile.
     ///
     /// # Panics
     /// If `thetas` is not a whole number of vectors.
@@ -89,7 +89,7 @@ impl LogPosterior {
         self.names().iter().map(|name| self.origin.optimum.parameters[name]).collect()
     }
 
-    /// Their standard deviations by the curvature there.
+    /// Their standard deviations from the curvature there.
     pub fn sd(&self) -> Vec<f64> {
         self.names().iter().map(|name| self.origin.optimum.sd[name]).collect()
     }

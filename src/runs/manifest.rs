@@ -1,7 +1,7 @@
-//! What a run was begun with: `manifest.json`, beside the chain it belongs to.
+//! The manifest of a run: `manifest.json`, beside its chain.
 //!
 //! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat`
-//! and `ess` of the config). Everything that a chain is a function of is in it or checked against it.
+//! and `ess` of the config). Everything that determines a chain is in it or checked against it.
 
 mod conclusions;
 
@@ -25,7 +25,7 @@ use std::path::Path;
 /// Name of the file in a run's folder.
 pub const FILE: &str = "manifest.json";
 
-/// Share of the rotation period, or of a fraction of it, within which spots imitate an orbit
+/// Fraction of the rotation period, or of a fraction of it, within which spots mimic an orbit
 /// (`results/calibration.md`).
 const NEAR_ROTATION: f64 = 0.15;
 
@@ -37,7 +37,7 @@ pub struct Manifest {
     pub origin: Origin,
     /// Names of the sampled parameters, in the order of the chain.
     pub names: Vec<String>,
-    /// Names of the numbers beside the log-probability of each draw.
+    /// Names of the other values of each draw.
     #[serde(default = "posterior_numbers")]
     pub numbers: Vec<String>,
     /// Priors of the parameters.
@@ -48,12 +48,12 @@ pub struct Manifest {
     pub walkers: usize,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Step that the chain goes on to in any case, where it was extended.
+    /// Smallest last step of the chain, where it was extended.
     pub extend_to: Option<usize>,
-    /// Seeds of the runs that were joined, where this is several joined ones, which cannot go on.
+    /// Seeds of the joined runs, if it is a merged run, which cannot be resumed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub merged_seeds: Vec<u64>,
-    /// The blind search that the verdict rests on; absent where no orbit was asked for.
+    /// The blind search behind the verdict; absent where no orbit was searched for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind_search: Option<SearchSummary>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
@@ -67,7 +67,7 @@ fn posterior_numbers() -> Vec<String> {
 impl Saved for Manifest {}
 
 impl Manifest {
-    /// What a reader of the chain must know beside it, one line each.
+    /// Warnings for readers of the chain, one line each.
     pub fn warnings(&self) -> Vec<String> {
         let place = |rival: &OptimumRecord| {
             let values: Vec<String> = self.names.iter().map(|n| format!("{n} {:.4}", rival.parameters[n])).collect();
@@ -80,13 +80,13 @@ impl Manifest {
         self.origin.rivals.iter().map(line).chain(warnings).chain(measured).collect()
     }
 
-    /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an
-    /// orbit there, and the posterior does not know of them.
+    /// A warning where the period found is the rotation's or a fraction of it: residual unresolved spots look like an
+    /// orbit there, and the posterior does not include them.
     pub fn co_rotation(&self, summary: &Summary) -> Option<String> {
         let counted = self.origin.config.pointer("/imaging/unresolved_spots").is_some_and(|value| value != "entropy");
         let period = summary.parameters.get(Parameter::PorbOverProt.name()).filter(|_| !counted)?;
         let [low, high] = period.ci68;
-        // a period that may be anything says nothing
+        // an unconstrained period gives no warning
         if high > low * (1.0 + 2.0 * NEAR_ROTATION) {
             return None;
         }
@@ -102,13 +102,13 @@ impl Manifest {
         ))
     }
 
-    /// Star and data, for what is usually quoted of an orbit.
+    /// Star and data, for commonly quoted quantities of an orbit.
     pub fn orbit_quantities(&self, settings: &Settings) -> OrbitQuantities {
         OrbitQuantities::new(&settings.star, settings.mass_msun, self.origin.time_span_d)
     }
 
-    /// The summary of the run's chain with its verdict, and with what is usually quoted of the orbit, draw by draw,
-    /// also apart.
+    /// The summary of the run's chain with its verdict, and with commonly quoted quantities of the orbit, draw by draw,
+    /// also separately.
     ///
     /// # Errors
     /// A chain without a step.
@@ -136,14 +136,14 @@ impl Manifest {
         Ok((RunSummary::of(chain, summary, settings, self.blind_search.as_ref()), settled))
     }
 
-    /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was
-    /// injected.
+    /// The injected value of a quantity of the orbit, for an event the one nearest to the estimate; `None` where no
+    /// planet was injected.
     pub fn true_quantity(&self, settings: &Settings, name: &str, estimate: f64) -> Option<f64> {
         let truth = self.origin.truth.as_ref()?;
         let quoted = Quoted::from_name(name)?;
         let elements = &Elements::PLANETS[quoted.planet];
         let mut values = settings.values;
-        // an orbit that was simulated is a circle unless its shape is there
+        // a simulated orbit is circular unless its shape is given
         values.orbit_mut(elements.planet).shape = None;
         let given = truth.iter().filter_map(|(name, value)| Some((Parameter::from_name(name)?, *value)));
         given.filter(|(p, _)| !p.is_ephemeris()).for_each(|(p, value)| values.set(p, value));
@@ -151,7 +151,7 @@ impl Manifest {
         self.orbit_quantities(settings).value(quoted.quantity, &elements.orbit(&values), Some(estimate))
     }
 
-    /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed
+    /// Injected values of the parameters and of derived quantities in `summary`, for its table; `None` for observed
     /// data.
     pub fn truth(&self, settings: &Settings, summary: &Summary) -> Option<BTreeMap<String, f64>> {
         let mut truth = self.origin.truth.clone()?;
@@ -190,7 +190,7 @@ impl Manifest {
         }
     }
 
-    /// What it was begun with, and the names of its parameters.
+    /// Its origin, and the names of its parameters.
     fn parts(&self) -> (&Origin, Vec<String>) {
         (&self.origin, self.names.clone())
     }
@@ -212,7 +212,7 @@ impl Manifest {
         chain.records().iter().enumerate().find_map(|(k, record)| Some((k + 1, problem(record)?)))
     }
 
-    /// Whether the start is of the chain's shape.
+    /// Whether the start has the chain's shape.
     fn has_shape(&self) -> bool {
         let walker = |theta: &Vec<f64>| theta.len() == self.names.len();
         let ensemble = |walkers: &Vec<Vec<f64>>| walkers.len() == self.walkers && walkers.iter().all(walker);
@@ -227,8 +227,8 @@ impl Manifest {
         write_json(&folder.join(FILE), self)
     }
 
-    /// Takes over settings that may change between the parts of a run (its length and goals), and the step that it goes
-    /// on to in any case. A new step limit ends an extension. Returns whether anything changed.
+    /// Adopts settings that may change between the parts of a run (its length and goals), and its smallest last step. A
+    /// new step limit ends an extension. Returns whether anything changed.
     pub fn update(&mut self, settings: &Settings, extend_to: Option<usize>) -> bool {
         let before = (self.extend_to, self.origin.config.clone());
         let steps = |config: &serde_json::Value| config.pointer("/sampler/steps").cloned();
@@ -250,16 +250,16 @@ impl Manifest {
         Shape { names, numbers, ensembles: self.ensembles, walkers: self.walkers }
     }
 
-    /// The settings that the run was begun with.
+    /// The settings of the run.
     ///
     /// # Errors
-    /// A config that this version does not understand.
+    /// A config that this version does not support.
     pub fn settings(&self, folder: &Path) -> Result<Settings, OriginError> {
         Ok(Config::at(self.origin.config.clone(), &folder.join(FILE)).settings()?)
     }
 }
 
-/// Whether a prior holds a value, within rounding at its bounds and as far as a Gaussian without bounds can reach.
+/// Whether a prior contains a value, within rounding at its bounds and within the range of an unbounded Gaussian.
 fn holds(prior: &Prior, x: f64) -> bool {
     let (min, max) = prior.bounds();
     let slack = 1e-9 * if (max - min).is_finite() { max - min } else { 1.0 };
@@ -273,7 +273,7 @@ fn holds(prior: &Prior, x: f64) -> bool {
 /// A Gaussian has no double-precision density beyond so many standard deviations.
 const BEYOND_GAUSSIAN: f64 = 40.0;
 
-/// What sort of number each free parameter is, and the goals of the chain.
+/// The kind of each free parameter, and the goals of the chain.
 pub fn kinds_and_goals(settings: &Settings) -> (Vec<ParameterKind>, Goals) {
     let kind = |f: &FreeParameter| match (f.parameter, f.prior) {
         (_, Prior::Periodic) => ParameterKind::Periodic,

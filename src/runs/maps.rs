@@ -1,4 +1,4 @@
-//! What `map` finds: one image of the star, or the maps of a star that may change; with the reason where they do not
+//! The results of `map`: one image of a static star, or the maps of an evolving one; with the reason where they do not
 //! fit.
 
 use crate::data::calibrated::suspects;
@@ -24,14 +24,14 @@ pub struct Maps<'a> {
     maps: Box<SurfaceMaps>,
     /// RV offsets of data sets, where they are fitted.
     offsets: Vec<ConstantVelocity>,
-    /// Why they do not fit as well as the errors promise, or what is likely to be wrong with the model of the star.
+    /// Why they do not fit as well as the uncertainties imply, or what is probably wrong with the model of the star.
     diagnosis: Option<Diagnosis>,
 }
 
 /// Why there is no map.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
-    /// No maps can be asked for at these times.
+    /// No maps are available at these times.
     #[error("{0}")]
     Times(String),
     /// There are none; with the likely reason.
@@ -39,21 +39,21 @@ pub enum MapError {
     NoMaps {
         /// The config.
         config: PathBuf,
-        /// What the reconstruction came to.
+        /// The error of the reconstruction.
         error: NoMaps,
-        /// `; ` and why, or nothing.
+        /// `; ` and the reason, or nothing.
         reason: String,
     },
 }
 
-/// What an error is of.
+/// The subject of an error.
 fn what(error: &NoMaps) -> String {
     error.status().map_or_else(|| "imaging.chi2_target: ".to_owned(), |status| format!("no map ({status}): "))
 }
 
 impl<'a> Maps<'a> {
-    /// The maps at the config's values; where they evolve at `times_d` (d), by default a map a night. `report` is told
-    /// what is under way.
+    /// The maps at the config's values; where they evolve at `times_d` (d), by default one map per night. `report` is
+    /// called with the current stage.
     ///
     /// # Errors
     /// [`MapError`].
@@ -72,7 +72,7 @@ impl<'a> Maps<'a> {
         if suspicious && (map_changes || found.is_err()) {
             report("diagnosing the misfit");
         }
-        // a map that changes tells nothing of the errors
+        // an evolving map does not test the uncertainties
         let told = |diagnosis: &Diagnosis| !map_changes || diagnosis.reason != Reason::Errors;
         let diagnosis = suspicious.then(|| diagnosis(scene)).flatten().filter(told);
         match found {
@@ -115,7 +115,7 @@ impl<'a> Maps<'a> {
         let Maps { scene, maps, diagnosis, .. } = self;
         let (imager, observations, truth) = (&scene.imager, &scene.observations, scene.truth);
         let provenance = &Provenance { measured: self.measured(), ..scene.provenance() };
-        // of a map that evolves the truth is another one at each time
+        // for an evolving map the truth differs at each time
         let true_map = maps.summary.image.as_ref().and_then(|_| scene.true_map());
         let true_map = true_map.as_deref();
         let diagnosis = diagnosis.as_ref().filter(|_| maps.field.is_none());
@@ -123,14 +123,14 @@ impl<'a> Maps<'a> {
         MapResult { imager, observations, maps, true_map, truth, diagnosis, provenance }.write(folder)
     }
 
-    /// What warns of the fit and how good it is, with label and text per line.
+    /// Warnings on the fit and its statistics, with label and text per line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let Maps { scene, maps, diagnosis, .. } = self;
         let text = diagnosis.as_ref().map(|diagnosis| diagnosis.text.clone());
         let misfit = match (&maps.field, text) {
             (Some(_), text) => text,
             (None, Some(text)) => Some(format!("The model does not fit to the continuum noise: {text}")),
-            // of several data sets the reason is not looked for
+            // with several data sets the reason is not determined
             (None, None) => scene.measured.misfit_text(),
         };
         let warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().chain(misfit);
@@ -140,20 +140,20 @@ impl<'a> Maps<'a> {
         lines
     }
 
-    /// What the config leaves to the observations, with the RV offsets that these maps give.
+    /// Quantities measured from the observations, with the RV offsets of these maps.
     fn measured(&self) -> Measured {
         self.scene.measured.clone().with_zero_points(&self.offsets)
     }
 }
 
-/// How a warning begins that a search answers.
+/// Beginning of a warning that a search resolves.
 pub const AS_ORBIT: &str = "Spot-corrected RVs vary as on a circular orbit";
 
-/// What the velocities of evolving maps say where no orbit is assumed: as in the blind search of `periodogram`.
+/// Velocities of evolving maps where no orbit is assumed: as in the blind search of `periodogram`.
 struct FreeVelocities {
-    /// The best orbit, and how often stars without a planet show one as good; `None` where the config assumes an orbit.
+    /// The best orbit, with its false-alarm probability; `None` where the config assumes an orbit.
     orbit: Option<(Peak, f64)>,
-    /// RV offsets of data sets that are fitted: beside that orbit if it is significant.
+    /// RV offsets of data sets that are fitted: with that orbit if it is significant.
     offsets: Vec<ConstantVelocity>,
 }
 
@@ -183,8 +183,8 @@ impl FreeVelocities {
         Some((*peak, search.false_alarm.probability(peak.orbit.delta_ln_l).value()))
     }
 
-    /// That the velocities vary as an orbit would, which the jitter has taken up; `None` also where the maps are not
-    /// those of this star.
+    /// The warning that the velocities vary as an orbit would, which the jitter has absorbed; `None` also where the
+    /// maps belong to another star.
     fn warning(&self, scene: &Scene, maps: &SurfaceMaps) -> Option<String> {
         let absorbs = maps.field.as_ref().and_then(SpotField::absorbs);
         if scene.measured.other_rotation.is_some_and(|other| other.is_far()) || absorbs.is_some() {
@@ -206,19 +206,19 @@ impl FreeVelocities {
     }
 }
 
-/// Why no map of `scene` fits, as [`Maps`] has it: `; ` and the likely reason, or nothing.
+/// Why no map of `scene` fits, in the format of [`Maps`]: `; ` and the likely reason, or nothing.
 pub fn reason(scene: &Scene) -> String {
     let map_changes = scene.settings.imaging.objective.properties().map_changes;
     let told = diagnosis(scene).filter(|diagnosis| !map_changes || diagnosis.reason != Reason::Errors);
     suspects(&scene.measured.profiles) + &told.map_or_else(String::new, |told| format!("; {}", told.text))
 }
 
-/// Why no map of `scene` fits, by trying.
+/// Why no map of `scene` fits, by test fits.
 fn diagnosis(scene: &Scene) -> Option<Diagnosis> {
     Diagnosis::of(scene)
 }
 
-/// The numbers of the maps.
+/// The statistics of the maps.
 fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     let SurfaceMaps { summary: fit, field, light, nuisances, zero_points_kms, .. } = maps;
     let MapSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
@@ -270,7 +270,7 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// A velocity to 1 m/s, or to 1 m/s in km/s from 1 km/s on.
+/// A velocity to 1 m/s: in m/s, or from 1 km/s on in km/s.
 fn metres(kms: f64) -> String {
     speed(kms, 0.01)
 }

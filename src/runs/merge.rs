@@ -1,8 +1,7 @@
-//! Runs of independent ensembles joined into one: what an array of jobs has sampled, as if it were one chain.
+//! Runs of independent ensembles joined into one: the samples of an array of jobs, as if they were one chain.
 //!
-//! Runs belong together if they are of the same program, config and data, start every evaluation from the same
-//! reference, and have different seeds. What is beyond the shortest of them is left out, for a step is one of all
-//! ensembles.
+//! Runs can be joined if they have the same program, config and data, start every evaluation from the same reference,
+//! and have different seeds. Steps beyond the shortest of them are omitted, because a step contains all ensembles.
 
 use crate::data::config::{self, Config, ConfigError};
 use crate::data::io::atomic::{WriteError, write_set};
@@ -15,33 +14,33 @@ use crate::sampling::chain::{Chain, ChainError, Record};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Runs that belong together, joined.
+/// Joined runs.
 #[derive(Debug)]
 pub struct Merged {
-    /// What they were begun with, as one run of all their ensembles.
+    /// Their manifest, as one run of all their ensembles.
     pub manifest: Manifest,
     /// The first steps of all of them.
     pub chain: Chain,
-    /// Steps of each run that are left out.
+    /// Omitted steps of each run.
     pub beyond: Vec<usize>,
 }
 
 /// Why runs are not joined: one line naming folders.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
-    /// There is nothing to join.
+    /// There is only one run.
     #[error("give two or more runs")]
     One,
     /// A run cannot be read.
     #[error(transparent)]
     Origin(#[from] OriginError),
-    /// Its chain cannot be read, or the joined one not be written.
+    /// Its chain cannot be read, or the joined one cannot be written.
     #[error(transparent)]
     Journal(#[from] JournalError),
     /// Its config does not resolve.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The steps of a run do not fit: a fault of the program.
+    /// The steps of a run do not fit: a bug.
     #[error(transparent)]
     Chain(#[from] ChainError),
     /// The joined manifest cannot be written.
@@ -61,14 +60,14 @@ pub enum MergeError {
         /// The seed.
         seed: u64,
     },
-    /// Two runs do not belong together.
+    /// Two runs cannot be joined.
     #[error("{} and {}: {what}", first.display(), second.display())]
     Apart {
         /// One folder.
         first: PathBuf,
         /// The other.
         second: PathBuf,
-        /// What is not the same.
+        /// The difference.
         what: String,
     },
 }
@@ -76,7 +75,7 @@ pub enum MergeError {
 /// Joins the runs in `folders`, in this order.
 ///
 /// # Errors
-/// [`MergeError`]: runs that cannot be read, or do not belong together.
+/// [`MergeError`]: runs that cannot be read, or cannot be joined.
 pub fn merge(folders: &[PathBuf]) -> Result<Merged, MergeError> {
     if folders.len() < 2 {
         return Err(MergeError::One);
@@ -108,8 +107,8 @@ pub fn merge(folders: &[PathBuf]) -> Result<Merged, MergeError> {
 }
 
 impl Merged {
-    /// Writes it as a run into `folder`, which is there, the chain as a whole: a shorter one would be taken for it. One
-    /// that is there already is replaced if `replace`, unless it is being written, and refused otherwise.
+    /// Writes it as a run into the existing `folder`, the chain as a whole: a shorter one would be read as complete. An
+    /// existing run is replaced if `replace`, unless it is being written, and refused otherwise.
     ///
     /// # Errors
     /// [`MergeError`].
@@ -136,10 +135,10 @@ impl Merged {
     }
 }
 
-/// The first thing in which two runs do not belong together.
+/// The first difference that prevents joining two runs.
 fn difference(first: &Manifest, second: &Manifest) -> Option<String> {
     let (a, b) = (&first.origin, &second.origin);
-    // what may differ is taken from the first
+    // keys that may differ are copied from the first
     let mut alike = b.config.clone();
     for key in ["seed", "ensembles"] {
         if let (Some(to), Some(from)) = (alike.pointer_mut("/sampler"), a.config.pointer(&format!("/sampler/{key}"))) {
@@ -164,7 +163,7 @@ fn difference(first: &Manifest, second: &Manifest) -> Option<String> {
     Some(what)
 }
 
-/// What all runs together were begun with.
+/// The common manifest of all runs.
 fn joined(manifests: &[Manifest], folder: &Path) -> Result<Manifest, MergeError> {
     let first = &manifests[0];
     let ensembles = manifests.iter().map(|manifest| manifest.ensembles).sum();
@@ -180,7 +179,7 @@ fn joined(manifests: &[Manifest], folder: &Path) -> Result<Manifest, MergeError>
     Ok(manifest)
 }
 
-/// A step of all runs, the ensembles numbered through.
+/// A step of all runs, the ensembles numbered consecutively.
 fn all_of(chains: &[Chain], step: usize) -> Vec<Record> {
     let mut before = 0;
     let mut records = Vec::new();

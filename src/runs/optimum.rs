@@ -1,4 +1,4 @@
-//! What `optimise` found: `optimum.json`, and the same as a table.
+//! The results of `optimise`: `optimum.json`, and the same as a table.
 
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::provenance::Provenance;
@@ -31,41 +31,41 @@ pub struct OptimumFile {
     /// Best value and standard deviation of each, and the log-probability there.
     #[serde(flatten)]
     pub optimum: OptimumRecord,
-    /// Numbers beside the log-probability there, by name.
+    /// Other values of the evaluation there, by name.
     #[serde(flatten, deserialize_with = "numbers_alone")]
     pub numbers: BTreeMap<String, f64>,
-    /// What the standard deviations of some are multiplied by, where those of the curvature are too small.
+    /// Factors on the standard deviations of some parameters, where those of the curvature are too small.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub widened: BTreeMap<String, f64>,
-    /// Whether the curvature is positive definite: without that the standard deviations mean nothing.
+    /// Whether the curvature is positive definite: otherwise the standard deviations are meaningless.
     pub well_defined: bool,
     /// Whether the search met its tolerance.
     pub converged: bool,
-    /// Covariance of the parameters from the curvature, widened as the standard deviations.
+    /// Covariance of the parameters from the curvature, widened like the standard deviations.
     pub covariance: Vec<Vec<f64>>,
     /// Minus the Hessian of the log-probability in sampling coordinates, where K and phi (if both are free) are K cos
     /// and K sin of the orbital phase at mid-time.
     pub internal_curvature: Vec<Vec<f64>>,
-    /// The blind search that the verdict rests on; absent where no orbit was asked for.
+    /// The blind search behind the verdict; absent where no orbit was searched for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind_search: Option<SearchSummary>,
-    /// What is usually quoted of the orbit, with standard deviations by the same covariance.
+    /// Commonly quoted quantities of the orbit, with standard deviations from the same covariance.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derived: BTreeMap<String, Estimate>,
     /// Injected values, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
-    /// The same of what is usually quoted of the orbit, times nearest to those found.
+    /// The same for commonly quoted quantities of the orbit, times nearest to those found.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derived_truth: BTreeMap<String, f64>,
     /// The reference image.
     pub reference: SurfaceRecord,
-    /// Where the climbs started and ended, by regularised likelihood.
+    /// Starts and ends of the climbs, by regularised likelihood.
     pub starts: Vec<StartRecord>,
     /// Number of profiles.
     pub profiles: usize,
     /// First and last time of the data (d).
     pub time_span_d: Option<[f64; 2]>,
-    /// Where all this came from.
+    /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
 }
@@ -93,26 +93,26 @@ impl Saved for OptimumFile {
 /// One climb.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StartRecord {
-    /// Where it started.
+    /// Its start.
     pub start: Vec<f64>,
-    /// Where it ended; null if it failed.
+    /// Its end; null if it failed.
     pub end: Option<Vec<f64>>,
     /// The regularised log-probability there.
     pub log_prob: Option<f64>,
     /// Whether the climb met its tolerance.
     pub converged: bool,
-    /// Evaluations it took.
+    /// Its number of evaluations.
     pub evaluations: usize,
 }
 
-/// Of the keys that nothing else has claimed so far, those of numbers.
+/// The numeric ones among the keys that no other field claims.
 fn numbers_alone<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, f64>, D::Error> {
     let all = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
     Ok(all.into_iter().filter_map(|(name, value)| Some((name, value.as_f64()?))).collect())
 }
 
 impl OptimumFile {
-    /// The file for what a search in `scene` found.
+    /// The file for the result `found` of a search in `scene`.
     pub fn new(scene: &Scene, found: &Found) -> Self {
         let reference = found.posterior.record();
         let free = scene.space.free();
@@ -157,7 +157,7 @@ impl OptimumFile {
         write_json(&folder.join(FILE), self)
     }
 
-    /// What has to be known beside the best values.
+    /// Warnings on the best values.
     pub fn warnings(&self) -> Vec<String> {
         let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
         let held = self.provenance.measured.held_regions(&self.names);
@@ -195,7 +195,7 @@ impl OptimumFile {
         table
     }
 
-    /// What is usually quoted of the orbit, and what names mean.
+    /// Commonly quoted quantities of the orbit, and descriptions of names.
     fn derived_table(&self) -> String {
         let of = Quoted::all().map(Quoted::name);
         let rows: Vec<(&str, &Estimate)> = of.filter_map(|name| Some((name, self.derived.get(name)?))).collect();
@@ -222,7 +222,7 @@ impl OptimumFile {
     }
 }
 
-/// What is usually quoted of the orbit at the optimum, and the injected values of the same.
+/// Commonly quoted quantities of the orbit at the optimum, and their injected values.
 fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<String, Estimate>, BTreeMap<String, f64>) {
     let settings = &scene.settings;
     let quantities = OrbitQuantities::new(&settings.star, settings.mass_msun, scene.observations.time_span_d());

@@ -1,7 +1,7 @@
-//! What a long computation was begun with: config, data, program and the reference that every evaluation starts from.
+//! The origin of a long computation: config, data, program and the reference that every evaluation starts from.
 //!
-//! It is written beside the results, and whoever goes on with them checks it: nothing is continued with another config
-//! or other data, and the reference is rebuilt to the same bits.
+//! It is written beside the results, and checked when they are resumed: a computation continues only with the same
+//! config and data, and the reference is rebuilt to the same bits.
 
 use crate::data::config::{self, ConfigError};
 use crate::data::io::provenance::{Measured, Provenance};
@@ -17,18 +17,18 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a computation was begun with.
+/// The origin of a computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
     /// Version of the program.
     pub version: String,
-    /// SHA-256 (hex) of the part of the config that decides the posterior and the chain.
+    /// SHA-256 (hex) of the part of the config that determines the posterior and the chain.
     pub config_sha256: String,
     /// SHA-256 (hex) of the observations.
     pub data_sha256: String,
     /// The config with all defaults filled in.
     pub config: serde_json::Value,
-    /// What the config leaves to the observations.
+    /// Quantities measured from the observations.
     #[serde(default, skip_serializing_if = "Measured::is_empty")]
     pub measured: Measured,
     /// Number of profiles.
@@ -43,7 +43,7 @@ pub struct Origin {
     pub reference: SurfaceRecord,
     /// The best parameters that the search found.
     pub optimum: OptimumRecord,
-    /// Other maxima that it found, by regularised likelihood, not much lower than the best.
+    /// Other maxima of the search, by regularised likelihood, not much lower than the best.
     pub rivals: Vec<OptimumRecord>,
 }
 
@@ -59,7 +59,7 @@ pub struct OptimumRecord {
     pub log_prob: f64,
 }
 
-/// Files by which the folder of a command is known.
+/// Files that identify the command of a folder.
 const KINDS: [(&str, &str); 11] = [
     ("manifest.json", "sample"),
     ("periodogram.json", "periodogram"),
@@ -74,7 +74,7 @@ const KINDS: [(&str, &str); 11] = [
     ("truth.json", "simulate"),
 ];
 
-/// What a folder is instead of what was looked for.
+/// The actual content of a folder without the expected file.
 fn instead(folder: &Path) -> String {
     if !folder.exists() {
         return "no such folder".to_owned();
@@ -85,15 +85,15 @@ fn instead(folder: &Path) -> String {
     }
 }
 
-/// What was begun cannot be used, or not be gone on with: one line naming file or folder.
+/// A computation cannot be used or resumed: one line naming file or folder.
 #[derive(Debug, thiserror::Error)]
 pub enum OriginError {
-    /// Nothing was begun there.
+    /// No computation was begun there.
     #[error("{}: no {file}: {}", folder.display(), instead(folder))]
     Missing {
         /// The folder.
         folder: PathBuf,
-        /// The file that should be there.
+        /// The missing file.
         file: &'static str,
     },
     /// The file cannot be read.
@@ -104,7 +104,7 @@ pub enum OriginError {
         /// Why.
         source: std::io::Error,
     },
-    /// It is not what it should be.
+    /// It has another format.
     #[error("{}: {source}", path.display())]
     Json {
         /// The file.
@@ -112,18 +112,18 @@ pub enum OriginError {
         /// Why.
         source: serde_json::Error,
     },
-    /// What it says does not belong together.
+    /// Its content is inconsistent.
     #[error("{}: {problem}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// The config in it does not resolve.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Config or data are not those that it was begun with.
+    /// Config or data have changed.
     #[error("{}: {what} since this run began; start a new run", .folder.display())]
     Changed {
         /// The folder.
@@ -131,17 +131,17 @@ pub enum OriginError {
         /// What changed.
         what: String,
     },
-    /// The reference comes out differently: another version of the program, or another kind of processor.
+    /// The reference differs: another version of the program, or another kind of processor.
     #[error("{}: the reference comes out differently here ({what} {now:e} instead of {then:e}): resume with the \
     version and on the kind of machine it was begun with", folder.display())]
     Irreproducible {
         /// The folder.
         folder: PathBuf,
-        /// Which of its numbers.
+        /// Name of the differing value.
         what: &'static str,
-        /// That number then.
+        /// The recorded value.
         then: f64,
-        /// And now.
+        /// The new value.
         now: f64,
     },
     /// No reference at the recorded parameters.
@@ -149,7 +149,8 @@ pub enum OriginError {
     Reference(RebuildError),
 }
 
-/// Of what begins in `scene` with what the search `found`: zero points of data sets are those beside its best orbit.
+/// The provenance of a computation that begins in `scene` with the result `found` of a search: RV offsets of data sets
+/// are those with its best orbit.
 pub fn provenance(scene: &Scene, found: &Found) -> Provenance {
     let of_scene = scene.provenance();
     let constants = found.detection.as_ref().and_then(|search| {
@@ -161,7 +162,7 @@ pub fn provenance(scene: &Scene, found: &Found) -> Provenance {
 }
 
 impl Origin {
-    /// What begins in `scene` with what the search `found`.
+    /// The origin of a computation that begins in `scene` with the result `found` of a search.
     pub fn of(scene: &Scene, found: &Found) -> Self {
         let Provenance { version, data_sha256, config_sha256, config, measured } = provenance(scene, found);
         let names = found.posterior.space().names();
@@ -180,7 +181,7 @@ impl Origin {
         }
     }
 
-    /// Whether what began in `folder` can go on in `scene`.
+    /// Whether the computation in `folder` can be resumed in `scene`.
     ///
     /// # Errors
     /// [`OriginError::Changed`].
@@ -197,7 +198,7 @@ impl Origin {
         Err(OriginError::Changed { folder: folder.into(), what })
     }
 
-    /// The posterior of `space` that it began with, its reference rebuilt to the same bits.
+    /// Its posterior of `space`, with the reference rebuilt to the same bits.
     ///
     /// # Errors
     /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
@@ -214,8 +215,8 @@ impl Origin {
     }
 }
 
-/// Reads the `file` that says what a computation in `folder` was begun with: what `T` does not know is refused, and so
-/// are parameters with other names than `names` finds in it.
+/// Reads the header `file` of a computation in `folder`: unknown keys are refused, and so are parameters with other
+/// names than `names` finds in it.
 ///
 /// # Errors
 /// As [`read`]; unknown keys, and records of other parameters.
@@ -252,13 +253,13 @@ pub fn read_header<T: Saved + Serialize>(
     Ok(header)
 }
 
-/// Keys of such files that are left out where there is nothing to say.
+/// Optional keys of such files.
 const OPTIONAL: [&str; 2] = ["measured", "merged_seeds"];
 
-/// Reads `file`, which a computation that began in `folder` has written there.
+/// Reads `file` of a computation in `folder`.
 ///
 /// # Errors
-/// A folder without it, or a file that cannot be read or is not what it should be.
+/// A folder without it, or a file that cannot be read or has another format.
 pub fn read<T: Saved>(folder: &Path, file: &'static str) -> Result<T, OriginError> {
     let path = folder.join(file);
     let text = std::fs::read(&path).map_err(|source| match source.kind() {

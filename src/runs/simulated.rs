@@ -1,4 +1,5 @@
-//! What `simulate` makes: profiles of a spotted star with a planet, one data set or several, and the truth behind them.
+//! The results of `simulate`: profiles of a spotted star with a planet, one data set or several, and the true
+//! parameters.
 
 use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource};
 use crate::data::io::atomic::{WriteError, write_set};
@@ -53,7 +54,7 @@ pub enum SimulateError {
         /// The section of the light curve.
         key: String,
     },
-    /// Config or profiles make no sense.
+    /// Config or profiles are invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
 }
@@ -103,13 +104,13 @@ impl Simulated {
         lsd::is_written(name) || name == truth::FILE || self.light_curves.iter().any(|(file, _)| file == name)
     }
 
-    /// The files that it was read from.
+    /// The input files.
     #[doc(hidden)]
     pub fn read(&self) -> &[PathBuf] {
         &self.read
     }
 
-    /// Writes `observations.txt`, the profiles that it lists and `truth.json` into `folder`, which must exist; of
+    /// Writes `observations.txt`, the profiles that it lists and `truth.json` into `folder`, which must exist; for
     /// several data sets each into a folder of its name there.
     ///
     /// # Errors
@@ -133,7 +134,7 @@ impl Simulated {
         Ok(())
     }
 
-    /// What was made, label and text a line.
+    /// The results, one label and text per line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let several = self.sets.len() > 1;
         let of = |set: &SimulatedSet| {

@@ -1,27 +1,27 @@
-//! Whether what a map leaves over looks like noise: replicated data, the model with noise of the errors given, against
-//! the data.
+//! Whether the residuals of a map look like noise: posterior predictive checks, with data replicated from the model
+//! with noise of the given uncertainties.
 //!
-//! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the
-//! profiles, between the core of the line and what lies outside, and whether neighbouring bins are correlated. In
-//! replicated data every profile of a data set has the same chi2 per datum, but for the scatter of a chi2 distribution,
-//! and neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many
-//! fewer. What the map itself takes up is spread evenly here.
+//! The total chi2 is not informative, because it is the requested target. Its distribution is: among the profiles,
+//! between the core of the line and the rest, and in the correlation of neighbouring bins. In replicated data every
+//! profile of a data set has the same chi2 per datum, within the scatter of a chi2 distribution, and neighbours are
+//! independent; noise that is correlated over several bins counts as correspondingly fewer bins. The degrees of freedom
+//! of the map are spread evenly here.
 
 use crate::numerics::json::number_or_null;
 use crate::numerics::normal::cumulative;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// A profile is worth a warning when chance makes one so bad among all of them as rarely as this.
+/// A profile is reported when chance makes one this bad among all of them as rarely as this.
 const RARE: f64 = 0.01;
 
-/// Neighbouring bins, and core against wings, are worth one beyond that many standard deviations.
+/// Neighbouring bins, and core against wings, are reported beyond that many standard deviations.
 const FAR: f64 = 5.0;
 
-/// Profiles that are named one by one at most.
+/// Largest number of profiles that are listed one by one.
 const NAMED: usize = 5;
 
-/// What is left over in one bin.
+/// The residual of one bin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Residual {
     /// Depth of the model.
@@ -32,7 +32,7 @@ pub(super) struct Residual {
     pub scaled: f64,
 }
 
-/// How the misfit is shared.
+/// The distribution of the misfit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checks {
     /// Profile by profile.
@@ -43,7 +43,7 @@ pub struct Checks {
     /// chi2 per datum outside of the core.
     #[serde(deserialize_with = "number_or_null")]
     pub chi2_per_datum_outside: f64,
-    /// By how many standard deviations of replicated data these differ.
+    /// Significance of their difference in standard deviations of replicated data.
     #[serde(deserialize_with = "number_or_null")]
     pub core_excess_sigma: f64,
     /// Correlation of the residuals of neighbouring bins.
@@ -52,7 +52,7 @@ pub struct Checks {
     /// Its standard deviation in replicated data.
     #[serde(deserialize_with = "number_or_null")]
     pub sigma_neighbour_correlation: f64,
-    /// What does not look like noise.
+    /// Deviations from noise.
     pub warnings: Vec<String>,
 }
 
@@ -65,20 +65,20 @@ pub struct ProfileCheck {
     pub chi2: f64,
     /// Number of bins.
     pub data: usize,
-    /// Probability that replicated data have a larger share of chi2 in this profile.
+    /// Probability that replicated data have a larger fraction of chi2 in this profile.
     #[serde(deserialize_with = "number_or_null")]
     pub p_value: f64,
 }
 
 impl Checks {
-    /// Of the `residuals` of every profile at its time, where noise is correlated over so many bins: they count for
-    /// one. Profiles are held against those of their own set of `sets`.
+    /// Checks of the `residuals` of every profile at its time, with noise correlated over so many bins, which count as
+    /// one. Profiles are compared with those of the same set of `sets`.
     pub(super) fn of(profiles: &[(f64, Vec<Residual>)], sets: &[Range<usize>], correlated_bins: f64) -> Self {
         Checks::with(profiles, sets, correlated_bins, false)
     }
 
-    /// The same of maps that take up much of the noise in the core of the line, one a profile: what they leave over is
-    /// smaller there, and neighbours have opposite signs. Only the reverse of it is worth a warning.
+    /// The same for maps, one per profile, that absorb much of the noise in the core of the line: their residuals are
+    /// smaller there, and neighbours have opposite signs. Only the reverse is reported.
     pub(super) fn of_flexible(profiles: &[(f64, Vec<Residual>)], sets: &[Range<usize>], correlated_bins: f64) -> Self {
         Checks::with(profiles, sets, correlated_bins, true)
     }
@@ -142,7 +142,7 @@ impl Checks {
         doubts
     }
 
-    /// Profiles that fit worse than the others: each, or of more than [`NAMED`] how many and the worst.
+    /// Profiles that fit worse than the others: each, or for more than [`NAMED`] their number and the worst.
     fn of_profiles(&self) -> Vec<String> {
         let rare = RARE / self.profiles.len() as f64;
         let numbered = self.profiles.iter().enumerate();
@@ -165,14 +165,14 @@ impl Checks {
     }
 }
 
-/// Mean of some numbers; NaN of none.
+/// Mean of some values; NaN for none.
 fn mean(x: impl Iterator<Item = f64>) -> f64 {
     let (n, sum) = x.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
     sum / n
 }
 
-/// Probability that chi2 of that many degrees of freedom is larger: its cube root is nearly normal (Wilson & Hilferty
-/// 1931).
+/// Probability that a chi2 with that many degrees of freedom is larger: its cube root is nearly normal (Wilson &
+/// Hilferty 1931).
 pub(super) fn chi2_exceeds(chi2: f64, freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     cumulative((1.0 - spread - (chi2 / freedom).cbrt()) / spread.sqrt())
@@ -248,7 +248,7 @@ mod tests {
         assert!(wave.warnings.iter().any(|w| w.contains("neighbouring bins")), "{:?}", wave.warnings);
     }
 
-    /// Errors of one set that are too large make no profile of another look bad.
+    /// Too large uncertainties of one set make no profile of another look bad.
     #[test]
     fn sets_are_held_against_themselves() {
         let errors = |k: usize, _: usize, noise: f64| if k < 30 { 0.6 * noise } else { noise };

@@ -1,5 +1,5 @@
-//! The velocities that profiles have in common: the systemic velocity, and the RV offsets of data sets. Their errors
-//! are those with all that is free: spots, jitter, each other, and the orbit that is reported.
+//! The velocities that profiles have in common: the systemic velocity, and the RV offsets of data sets. Their
+//! uncertainties include all that is free: spots, jitter, each other, and the reported orbit.
 
 use super::Linearised;
 use super::expansion::Nuisance;
@@ -20,27 +20,27 @@ pub struct ConstantVelocity {
     pub sigma_kms: f64,
 }
 
-/// A drift of the velocities: its slope in the middle of the data.
+/// A drift of the velocities: its slope at the middle of the data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundDrift {
     /// The slope (km/s per day).
     pub kms_d: f64,
     /// Its standard error (km/s per day).
     pub sigma_kms_d: f64,
-    /// Number of the data set (from 1) that it is of, where the offset of that set is fitted.
+    /// Number of its data set (from 1), where the offset of that set is fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub data_set: Option<usize>,
 }
 
-/// A drift of so many standard errors is a finding.
+/// A drift of so many standard errors is significant.
 const SIGNIFICANT: f64 = 4.0;
 
-/// A slope of so many standard errors beside no orbit is integrated out: a planet makes the errors larger.
+/// A slope of so many standard errors without an orbit is marginalised over: a planet makes the uncertainties larger.
 const INTEGRATED: f64 = 3.0;
 
-/// The slope of each drift of `imager` (km/s per day), where one is so steep that it is to be integrated out: by
-/// velocities of this quadratic beside no orbit, RV offsets and systemic velocity free as the `nuisances` say, held at
-/// `vsys_kms`.
+/// The slope of each drift of `imager` (km/s per day), where one is so steep that it is to be marginalised over: by
+/// velocities of this quadratic without an orbit, RV offsets and systemic velocity free according to the `nuisances`,
+/// held at `vsys_kms`.
 pub(super) fn slopes(
     held: &VelocityQuadratic,
     imager: &Imager,
@@ -78,12 +78,12 @@ fn commons(imager: &Imager, nuisances: &[Nuisance], vsys_kms: f64, n: usize) -> 
 }
 
 impl FoundDrift {
-    /// In units of its error.
+    /// In units of its uncertainty.
     fn sigmas(&self) -> f64 {
         self.kms_d.abs() / self.sigma_kms_d
     }
 
-    /// It in words.
+    /// A text.
     pub fn line(&self) -> String {
         let FoundDrift { kms_d, sigma_kms_d, data_set } = self;
         let m_s = |kms: f64| format!("{:.1}", 1000.0 * kms);
@@ -104,17 +104,18 @@ pub struct Constants {
     pub systemic: Option<ConstantVelocity>,
     /// RV offsets of those data sets whose offset is fitted, in the order of the sets.
     pub offsets: Vec<ConstantVelocity>,
-    /// Drift of the velocities, where one is integrated out: of several the most significant.
+    /// Drift of the velocities, where one is marginalised over: the most significant one of several.
     pub drift: Option<FoundDrift>,
-    /// What systemic velocity, offsets and drift add to the velocity of each profile in [`Linearised::held`] (km/s).
+    /// The contribution of systemic velocity, offsets and drift to the velocity of each profile in [`Linearised::held`]
+    /// (km/s).
     pub of_each_kms: DVector<f64>,
 }
 
 impl Linearised {
-    /// The velocities that profiles of `imager` have in common, beside the orbit of the `peak`, with its amplitude,
-    /// phase and period free, or beside none; and beside the amplitudes of other velocities, the columns of `known`
-    /// (profiles x amplitudes). The systemic velocity is free if it is among the `nuisances`. `None`
-    /// where they are not bounded.
+    /// The velocities that profiles of `imager` have in common, together with the orbit of the `peak`, its amplitude,
+    /// phase and period free, or without an orbit; and together with the amplitudes of other velocities, the columns of
+    /// `known` (profiles x amplitudes). The systemic velocity is free if it is among the `nuisances`. `None` where they
+    /// are not bounded.
     pub fn constants(
         &self,
         imager: &Imager,
@@ -126,7 +127,7 @@ impl Linearised {
         let (is_free, all) = commons(imager, nuisances, vsys_kms, n);
         let rest = known.and_then(|known| self.held.beside(known));
         let (values, sigmas) = common_velocities(rest.as_ref().unwrap_or(&self.held), &all, peak)?;
-        // from where the expansion holds them
+        // relative to where the expansion holds them
         let centres = is_free.then_some(vsys_kms).into_iter().chain(imager.zero_points.iter().map(|z| z.held_kms()));
         let found = centres.zip(values.iter().zip(&sigmas));
         let mut found = found.map(|(at, (value, sigma))| ConstantVelocity { value_kms: at + value, sigma_kms: *sigma });

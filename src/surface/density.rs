@@ -1,4 +1,4 @@
-//! What is searched, scanned and sampled: the density of the free parameters that a surface model gives.
+//! The function that is searched, scanned and sampled: the density of the free parameters under a surface model.
 
 use super::imaging::Imager;
 use super::objective::UnresolvedSpots;
@@ -10,7 +10,7 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Such a density, shared.
+/// A shared density.
 pub type Density = Arc<dyn SurfaceDensity>;
 
 /// The residual spots have no size that fits.
@@ -29,29 +29,29 @@ pub trait SurfaceDensity: LogDensity + Debug + Send {
     /// Star, times and data.
     fn imager(&self) -> &Imager;
 
-    /// ln L at `theta` (physical coordinates) without the prior, with the numbers of
+    /// ln L at `theta` (physical coordinates) without the prior, with the values of
     /// [`SurfaceDensity::likelihood_numbers`].
     fn likelihood(&self, theta: &[f64]) -> Evaluation;
 
-    /// Names of the numbers beside ln L.
+    /// Names of the values beside ln L.
     fn likelihood_numbers(&self) -> &[&str];
 
-    /// The same with the warm starts that so many evaluations, spread like `thetas`, are worth; itself where it needs
+    /// The same with the warm starts that pay off for so many evaluations, spread like `thetas`; itself where it needs
     /// none.
     fn with_warm_starts_for(self: Arc<Self>, thetas: &[Vec<f64>], evaluations: usize) -> Density;
 
     /// The same with warm starts at `thetas` (physical coordinates) besides the reference, and no others.
     fn with_warm_starts(self: Arc<Self>, thetas: &[Vec<f64>]) -> Density;
 
-    /// Where its warm starts are, but for the reference.
+    /// Positions of its warm starts, except the reference.
     fn warm_starts(&self) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
-    /// What is written of the reference, and what it is rebuilt from.
+    /// The record of the reference, from which it is rebuilt.
     fn record(&self) -> SurfaceRecord;
 
-    /// The density that a chain samples: the same, with unresolved spots as a config has them.
+    /// The density that a chain samples: the same, with unresolved spots as in a config.
     ///
     /// # Errors
     /// [`UnresolvedSpotsError`].
@@ -60,8 +60,8 @@ pub trait SurfaceDensity: LogDensity + Debug + Send {
     /// The quadratic of the density with the priors; `None` where there is none.
     fn surrogate(&self) -> Option<Surrogate>;
 
-    /// The surrogate fitted to the density itself, as far as it is not its own expansion, and the share of its
-    /// proposals accepted on trial.
+    /// The surrogate fitted to the density itself, unless it is its own expansion, and the fraction of its proposals
+    /// accepted in a test.
     fn fitted(&self, surrogate: Surrogate, evaluator: &dyn Evaluator) -> (Surrogate, f64);
 
     /// Itself.

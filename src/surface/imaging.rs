@@ -1,8 +1,8 @@
-//! Star and data meet: the [`Imager`] of every surface model; for maximum entropy, the misfit of a map to observed
-//! profiles, and the Doppler image.
+//! Star and data: the [`Imager`] of every surface model; for maximum entropy, the misfit of a map to observed profiles,
+//! and the Doppler image.
 //!
 //! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is `D =
-//! line(B) / continuum(B)` (`docs/method.md` section 1), whose second derivative is kept, so that the solver's Newton
+//! line(B) / continuum(B)` (`docs/method.md` section 1). Its second derivative is included, so that the solver's Newton
 //! steps are exact.
 
 mod data;
@@ -26,7 +26,7 @@ pub use data::Data;
 pub use drift::Drift;
 pub use problem::ImagingProblem;
 
-/// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
+/// Gaussian prior of the RV offset of a data set, around the value at which it is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZeroPointPrior {
     /// The data set.
@@ -38,44 +38,44 @@ pub struct ZeroPointPrior {
 }
 
 impl ZeroPointPrior {
-    /// Where the offset is held (km/s): its prior lies around 0.
+    /// The value at which the offset is held (km/s): its prior is centred on 0.
     pub fn held_kms(&self) -> f64 {
         -self.mean_kms
     }
 }
 
-/// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
+/// All that is fixed while parameters are varied: the star's surface and settings, times, and data.
 #[derive(Clone, Debug)]
 pub struct Imager {
     /// Pixels of a map.
     pub grid: SurfaceGrid,
-    /// Area of each pixel of all maps of a star that does not change, season by season, as a fraction of them; mostly
-    /// there is one season, and this is `grid.area`. Integrated maps have no seasons.
+    /// Area of each pixel of all static maps, season by season, as a fraction of them; usually there is one season, and
+    /// this is `grid.area`. Evolving maps have no seasons.
     pub areas: Vec<f64>,
-    /// The star, but for the parameters.
+    /// The star, except for the parameters.
     pub star: StarSettings,
-    /// The data sets, whose profiles follow each other: times and velocity bins, and what of the star looks different
-    /// through each.
+    /// The data sets, whose profiles follow each other: times and velocity bins, and stellar properties specific to
+    /// each.
     pub sets: Vec<Seen>,
     /// Observed depths and their weights.
     pub data: Data,
     /// Entropy of a map.
     pub entropy: Entropy,
-    /// The data sets whose velocity zero points are integrated out; mostly none.
+    /// The data sets whose RV offsets are marginalised over; usually none.
     pub zero_points: Vec<ZeroPointPrior>,
-    /// Light curves beside the profiles, of which only integrated maps know; mostly none.
+    /// Light curves beside the profiles, used only by evolving maps; usually none.
     pub light_curves: Vec<LightCurve>,
-    /// Activity indicators that have to do with the spots, of which only integrated maps know; mostly none.
+    /// Activity indicators that depend on the spots, used only by evolving maps; usually none.
     pub indicators: Vec<Indicator>,
-    /// Standard deviation of what is wrong alike in all profiles of a data set (continuum 1), of which only integrated
-    /// maps know; 0 for none.
+    /// Standard deviation of the error common to all profiles of a data set (continuum 1), used only by evolving maps;
+    /// 0 for none.
     pub mean_profile: f64,
-    /// RV jitter of each data set over that of the star; empty where all have the same. Only integrated maps know.
+    /// RV jitter of each data set over that of the star; empty where all have the same. Used only by evolving maps.
     pub jitter_shares: Vec<f64>,
     /// Standard deviation of the RV offset that profiles of one night share (km/s), of each data set; empty where there
-    /// is none. Only integrated maps know.
+    /// is none. Used only by evolving maps.
     pub night_jitters_kms: Vec<Option<f64>>,
-    /// Drifts of the velocities that are integrated out, of which only integrated maps know; mostly none.
+    /// Drifts of the velocities that are marginalised over, used only by evolving maps; usually none.
     pub drifts: Vec<Drift>,
 }
 
@@ -100,8 +100,8 @@ impl Imager {
         }
     }
 
-    /// The same for several data sets, whose profiles follow each other in `observations`; the first sees the `star` as
-    /// it is.
+    /// The same for several data sets, whose profiles follow each other in `observations`; the first one has the
+    /// properties of `star`.
     pub fn of_sets(
         star: StarSettings,
         sets: Vec<Seen>,
@@ -112,8 +112,7 @@ impl Imager {
         Imager { sets, ..Imager::new(star, observations, pixels, entropy) }
     }
 
-    /// The same with as many `maps`, one a season, of which each profile sees that which `own_map` gives for its time
-    /// (d).
+    /// The same with as many `maps`, one per season; `own_map` gives the map of each profile by its time (d).
     pub fn with_maps(mut self, maps: usize, own_map: impl Fn(f64) -> OwnMap) -> Self {
         let share = |area: &f64| area / maps as f64;
         self.areas = std::iter::repeat_n(&self.grid.area, maps).flatten().map(share).collect();
@@ -130,14 +129,13 @@ impl Imager {
         self
     }
 
-    /// How many maps the star has, one a season.
+    /// Number of maps of the star, one per season.
     pub fn maps(&self) -> usize {
         self.areas.len() / self.grid.len()
     }
 
-    /// Number of data, as far as weights of the entropy over it are concerned: of several maps, whose entropy is a
-    /// mean, that of the best observed season times the number of seasons. So no map gets more weight than it would
-    /// alone.
+    /// Number of data for weights of the entropy: with several maps, whose entropy is a mean, that of the best observed
+    /// season times the number of seasons. So no map gets more weight than it would alone.
     pub fn data_as_of_one_map(&self) -> f64 {
         let mut data = vec![0; self.maps()];
         for set in &self.sets {
@@ -148,7 +146,7 @@ impl Imager {
         (data.len() * data.iter().max().copied().unwrap_or(0)) as f64
     }
 
-    /// The map that each profile sees, from 0; empty where there is only one.
+    /// The index of each profile's map, from 0; empty where there is only one.
     pub fn map_of_each(&self) -> Vec<usize> {
         match self.maps() {
             1 => Vec::new(),
@@ -156,25 +154,25 @@ impl Imager {
         }
     }
 
-    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
+    /// The same, marginalised over nuisances of every profile of `observations`, within priors of these standard
     /// deviations.
     pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
         self.data.nuisances = Nuisances::new(priors, observations);
         self
     }
 
-    /// The same of several data sets, each with its own priors.
+    /// The same for several data sets, each with its own priors.
     pub fn with_nuisances_of(mut self, sets: &[(LineAndContinuum, &Observations)]) -> Self {
         self.data.nuisances = Nuisances::of_sets(sets);
         self
     }
 
-    /// Moves the velocities at which the profiles of a data set are expected, by `kms` to the red.
+    /// Shifts the expected velocities of the profiles of a data set by `kms` to the red.
     pub fn move_set(&mut self, set: usize, kms: f64) {
         self.sets[set].sampling.profiles.iter_mut().for_each(|profile| profile.1 -= kms);
     }
 
-    /// Moves the velocities at which one profile is expected, by `kms` to the red.
+    /// Shifts the expected velocity of one profile by `kms` to the red.
     fn move_profile(&mut self, mut k: usize, kms: f64) {
         for set in &mut self.sets {
             let profiles = &mut set.sampling.profiles;
@@ -186,14 +184,14 @@ impl Imager {
         }
     }
 
-    /// Holds a zero point that is integrated out farther to the red, by `kms`.
+    /// Holds an RV offset that is marginalised over farther to the red, by `kms`.
     pub fn move_zero_point(&mut self, z: usize, kms: f64) {
         self.move_set(self.zero_points[z].set, kms);
         self.zero_points[z].mean_kms -= kms;
     }
 
-    /// The velocities that are integrated out beside those of profiles: RV offsets of data sets, and then the drift;
-    /// for so many coordinates of an expansion, of which the velocities of all profiles come first.
+    /// The velocities to marginalise over beside those of profiles: RV offsets of data sets, and then the drift; for so
+    /// many coordinates of an expansion, of which the velocities of all profiles come first.
     pub fn common_velocities(&self, coordinates: usize) -> Vec<Common> {
         let offset = |prior: &ZeroPointPrior| {
             let mut of_each = DVector::zeros(coordinates);
@@ -213,7 +211,7 @@ impl Imager {
         all
     }
 
-    /// Brightness of a spot over that of the photosphere in a data set.
+    /// Brightness of a spot relative to the photosphere in a data set.
     pub fn contrast_of(&self, set: usize) -> f64 {
         self.sets[set].contrast.unwrap_or(self.star.contrast)
     }
@@ -238,7 +236,7 @@ impl Imager {
         known.filter(|(_, sd_kms)| *sd_kms > 0.0).flat_map(of_set).collect()
     }
 
-    /// The nights of a data set, by the numbers of their profiles.
+    /// The nights of a data set, by the indices of their profiles.
     fn nights_of(&self, set: usize) -> Vec<Vec<usize>> {
         let (times_d, profiles) = (self.times_d(), self.profiles_of(set));
         let first = profiles.start;
@@ -247,14 +245,14 @@ impl Imager {
         all
     }
 
-    /// Nights of the data sets whose offsets are of unknown size, by the numbers of their profiles.
+    /// Nights of the data sets whose night offsets have an unknown size, by the indices of their profiles.
     pub fn nights_of_sets(&self) -> Vec<Vec<usize>> {
         let is_known = |set: &usize| self.night_jitters_kms.get(*set).is_some_and(Option::is_some);
         (0..self.sets.len()).filter(|set| !is_known(set)).flat_map(|set| self.nights_of(set)).collect()
     }
 
-    /// The same with drifts of the velocities: that of all profiles whose offsets are known, and one of each data set
-    /// whose offset is fitted, from which a drift of the star from set to set would not be told.
+    /// The same with drifts of the velocities: one of all profiles whose offsets are known, and one of each data set
+    /// whose offset is fitted, which cannot be distinguished from a drift of the star between sets.
     pub fn with_drifts(mut self, curved: bool) -> Self {
         let is_fitted = |set: &usize| self.zero_points.iter().any(|prior| prior.set == *set);
         let fitted = (0..self.sets.len()).filter(is_fitted).map(Some);
@@ -267,7 +265,7 @@ impl Imager {
         self
     }
 
-    /// Holds each drift at a slope (km/s/d): profiles are expected where it moves them.
+    /// Holds each drift at a slope (km/s/d): the expected velocities of profiles include it.
     pub fn hold_drifts(&mut self, kms_d: &[f64]) {
         let times_d = self.times_d();
         for (d, kms_d) in kms_d.iter().enumerate() {
@@ -279,7 +277,7 @@ impl Imager {
         }
     }
 
-    /// The profiles that drift with it.
+    /// The profiles of a drift.
     fn drifting(&self, drift: &Drift) -> Vec<usize> {
         self.profiles_with_offset(drift.set)
     }
@@ -298,7 +296,7 @@ impl Imager {
         !self.zero_points.is_empty() || !self.drifts.is_empty()
     }
 
-    /// Whether any velocities are integrated out beside those of single profiles.
+    /// Whether any velocities are marginalised over beside those of single profiles.
     pub fn has_shared_velocities(&self) -> bool {
         self.has_common_velocities() || self.night_jitters_kms.iter().flatten().any(|sd_kms| *sd_kms > 0.0)
     }
@@ -329,8 +327,8 @@ impl Imager {
         (0..self.sets.len()).map(|set| self.profiles_of(set)).collect()
     }
 
-    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
-    /// depths change with velocity by `slopes`; in place of those that there were.
+    /// The same, marginalised over an RV jitter of every profile with this standard deviation (km/s), where the depths
+    /// change with velocity by `slopes`; it replaces the previous jitter.
     pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {
         let sigma: Vec<f64> = self.data.inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
         let nuisances = std::mem::take(&mut self.data.nuisances);
@@ -353,7 +351,7 @@ impl Imager {
             let mut k = before..first;
             set.exposures.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
-        // a data set of which nothing is left is none
+        // a data set without profiles is dropped
         let mut zero_points = self.zero_points.clone();
         let is_left = |set: &Seen| !set.sampling.profiles.is_empty();
         zero_points.retain(|prior| is_left(&sets[prior.set]));
@@ -381,12 +379,12 @@ impl Imager {
         }
     }
 
-    /// The same with errors of each profile times its factor.
+    /// The same with the uncertainties of each profile times its factor.
     pub fn with_larger_errors(&self, factors: &[f64]) -> Self {
         Imager { data: self.data.with_larger_errors(&self.bins(), factors), ..self.clone() }
     }
 
-    /// The same of each season by itself.
+    /// The same for each season by itself.
     pub fn seasons(&self) -> Vec<Self> {
         let map_of = self.map_of_each();
         let of_season = |map: usize| {
@@ -399,17 +397,17 @@ impl Imager {
         }
     }
 
-    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
+    /// For each profile: time (d), velocity of its first bin (km/s), number of bins.
     pub fn profiles(&self) -> impl Iterator<Item = (f64, f64, usize)> {
         self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
     }
 
-    /// Number of times at which the star is seen.
+    /// Number of times at which the star is observed.
     pub fn epochs(&self) -> usize {
         self.times_of_epochs().count()
     }
 
-    /// Times (d) at which the star is seen: of profiles, bins of light curves, and readings of indicators.
+    /// Times (d) at which the star is observed: of profiles, bins of light curves, and readings of indicators.
     pub fn times_of_epochs(&self) -> impl Iterator<Item = f64> {
         let bins = self.light_curves.iter().flat_map(|curve| &curve.bins).map(|bin| bin.time_d);
         let readings = self.indicators.iter().flat_map(|indicator| &indicator.readings).map(|reading| reading.time_d);
@@ -446,7 +444,7 @@ impl Imager {
         nearby.response(&self.grid, &self.star, state, &self.sets).unwrap_or_else(|| self.response(state))
     }
 
-    /// That of `response` at a state that differs from its own by orbit and systemic velocity alone.
+    /// `response` at a state that differs from its state by orbit and systemic velocity alone.
     pub fn with_velocities(&self, response: &Response, state: &StarState) -> Response {
         response.with_velocities(&self.star, state, &self.sets)
     }
@@ -478,7 +476,7 @@ impl Imager {
         last - first
     }
 
-    /// Length of the longest season in rotation cycles: as far as rotation turns a map.
+    /// Length of the longest season in rotation cycles: the span over which rotation is constrained by one map.
     pub fn longest_season_cycles(&self) -> f64 {
         match self.maps() {
             1 => self.time_base_cycles(),

@@ -1,5 +1,5 @@
-//! Activity indicators: readings of what goes with the spots of the visible disc (H alpha, S, a colour, a longitudinal
-//! field), in units of their own scatter (`docs/method.md` section 9).
+//! Activity indicators: readings of quantities that follow the spots of the visible disc (H alpha, S, a colour, a
+//! longitudinal field), in units of the scatter of each indicator (`docs/method.md` section 9).
 
 use super::photometry::Flux;
 
@@ -8,15 +8,15 @@ use super::photometry::Flux;
 pub struct Reading {
     /// Time (d).
     pub time_d: f64,
-    /// The value over the mean.
+    /// The value minus the mean.
     pub value: f64,
     /// Its standard error.
     pub sigma: f64,
-    /// When it was taken: -1 for the first, 1 for the last.
+    /// Its time, scaled: -1 for the first, 1 for the last.
     pub place: f64,
 }
 
-/// What the values of an indicator are counted from, and in.
+/// Origin and unit of the values of an indicator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     /// Their mean.
@@ -25,23 +25,24 @@ pub struct Scale {
     pub rms: f64,
 }
 
-/// An indicator that has to do with the spots.
+/// An indicator that depends on the spots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Indicator {
     /// Its name.
     pub name: String,
     /// Its number among all that were given, from 0.
     pub number: usize,
-    /// What its readings are counted from, and in.
+    /// Origin and unit of its readings.
     pub scale: Scale,
-    /// Its readings, in the order of time, with a jitter among their errors.
+    /// Its readings, in the order of time, with a jitter in their uncertainties.
     pub readings: Vec<Reading>,
-    /// Change of a reading by a filling factor of the visible disc of 1.
+    /// Change of a reading for a filling factor of the visible disc of 1.
     pub gain: f64,
 }
 
 impl Indicator {
-    /// Of measurements in the order of time, with a gain and a jitter in their units; the one of that `number`.
+    /// From measurements in the order of time, with a gain and a jitter in their units; the indicator with that
+    /// `number`.
     pub fn new((number, name): (usize, &str), measured: &[Flux], gain: f64, jitter: f64) -> Self {
         let (scale, mut readings) = scaled(measured);
         readings.iter_mut().for_each(|reading| reading.sigma = reading.sigma.hypot(jitter / scale.rms));
@@ -49,8 +50,8 @@ impl Indicator {
     }
 }
 
-/// Measurements in the order of time in units of their scatter; of values that are all the same, in units of their
-/// errors.
+/// Measurements in the order of time in units of their scatter; in units of their uncertainties if all values are
+/// equal.
 pub fn scaled(measured: &[Flux]) -> (Scale, Vec<Reading>) {
     let n = measured.len() as f64;
     let mean = measured.iter().map(|one| one.flux).sum::<f64>() / n;

@@ -1,4 +1,4 @@
-//! What every surface model gives at one place of parameter space, and why it may not.
+//! The results of every surface model at one point of parameter space, and its errors.
 
 use super::evolving_map::{LARGEST_AMPLITUDE, NoFit};
 use super::expansion::Expansion;
@@ -19,37 +19,36 @@ use std::sync::Arc;
 pub struct Linearised {
     /// ln L around it.
     pub expansion: Expansion,
-    /// ln L of the orbit's velocities, counted from 0 whatever the orbit at the centre; spots that the map does not
-    /// resolve count as noise.
+    /// ln L of the orbit's velocities, relative to 0 whatever the orbit at the centre; unresolved spots count as noise.
     pub quadratic: VelocityQuadratic,
-    /// The same with the systemic velocity and the RV offsets of data sets held that are otherwise integrated out: of
-    /// it are tables of velocities, whose errors are then those of each, and [`Constants`](super::Constants).
+    /// The same with the systemic velocity and the RV offsets of data sets held that are otherwise marginalised over:
+    /// for tables of velocities with individual uncertainties, and for [`Constants`](super::Constants).
     pub held: VelocityQuadratic,
     /// The same without that noise.
     pub regularised: VelocityQuadratic,
-    /// How many times larger than the model expects the unresolved spots are, in variance.
+    /// Size of the unresolved spots relative to the model's expectation, in variance.
     pub unresolved_spots: f64,
     /// Whether the maps reach the target chi2; true where there is none.
     pub on_target: bool,
-    /// The spots as a field, where they are one.
+    /// The field of spots, if the model has one.
     pub field: Option<SpotField>,
-    /// What the model keeps for itself.
+    /// The internal result of the model.
     pub(super) solution: Arc<dyn Any + Send + Sync>,
 }
 
 impl Linearised {
-    /// What the model that made it has kept.
+    /// The internal result of the model, of a known type.
     pub(super) fn kept<T: 'static>(&self) -> &T {
         self.solution.downcast_ref().expect("of the model that is asked")
     }
 
-    /// What the model that made it has kept, if that is such a thing.
+    /// The internal result of the model, if it has that type.
     pub fn solution<T: 'static>(&self) -> Option<&T> {
         self.solution.downcast_ref()
     }
 }
 
-/// A star but for its velocity jitter, which the profiles tell.
+/// A star without its RV jitter, which the profiles constrain.
 #[derive(Clone, Debug)]
 pub struct WithoutJitter {
     /// The star with its spots, without a jitter.
@@ -58,26 +57,26 @@ pub struct WithoutJitter {
     pub found_kms: f64,
     /// Scale of its prior (km/s), where it has one.
     pub scale_kms: Option<f64>,
-    /// Nights whose RV offsets are not known, where the profiles tell offsets from a jitter.
+    /// Nights with unknown RV offsets, where the profiles distinguish offsets from a jitter.
     pub nights: Option<Nights>,
 }
 
 impl WithoutJitter {
-    /// The likelihood of these velocities of this star beside jitters and offsets of nights of several sizes.
+    /// The likelihood of these velocities of this star with jitters and night offsets of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
         let jitter = (self.found_kms, self.scale_kms);
         let beside = |nights: &Nights| Some(beside_offsets(quadratic, nights, jitter, Reach::Stable)?.0);
         self.nights.as_ref().and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
-    /// The same of some of the profiles, in their order, beside what is likely in `of_all`.
+    /// The same for some of the profiles, in their order, with the sizes that are likely in `of_all`.
     pub fn of_some_beside(&self, quadratic: &VelocityQuadratic, of_all: &Jitters) -> Jitters {
         let nights = self.nights.as_ref().map(|nights| nights.of(&quadratic.cycles, &self.here.quadratic.cycles));
         let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, (self.found_kms, self.scale_kms));
         nights.and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
-    /// Beside jitters of several sizes alone.
+    /// With jitters of several sizes only.
     pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
         match self.found_kms > 0.0 {
             true => Jitters::new(quadratic, self.found_kms, self.scale_kms),
@@ -86,7 +85,7 @@ impl WithoutJitter {
     }
 }
 
-/// Spots as a Gaussian field on the sphere and in time, the most probable one.
+/// Spots as a Gaussian field on the sphere and in time, with the most probable parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpotField {
     /// Standard deviation of the filling factor.
@@ -102,18 +101,18 @@ pub struct SpotField {
     pub velocity_jitter_kms: f64,
     /// ln Z.
     pub ln_evidence: f64,
-    /// Which of them lie on a bound of the search.
+    /// Names of those that lie on a bound of the search.
     pub at_bounds: Vec<String>,
-    /// Their errors, where they were asked for.
+    /// Their uncertainties, where they were requested.
     #[serde(flatten)]
     pub errors: FieldErrors,
 }
 
-/// Errors of a logarithm beyond this are two errors of the number.
+/// Uncertainties of a logarithm beyond this are printed as asymmetric ones of the value.
 const UNEVEN: f64 = 0.25;
 
-/// Standard errors of a field, the jitter held, those of amplitude and lifetime of their logarithms, times the number;
-/// `None` of what is given, lies on a bound or is left open.
+/// Standard errors of a field, the jitter held; for amplitude and lifetime those of their logarithms, times the value;
+/// `None` for given, bounded or unconstrained parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FieldErrors {
     /// Of the standard deviation of the filling factor.
@@ -125,12 +124,12 @@ pub struct FieldErrors {
     /// Of the lifetime (d).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_spot_lifetime_d: Option<f64>,
-    /// Which of the three the profiles leave open.
+    /// Names of unconstrained parameters among the three.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unconstrained: Vec<String>,
 }
 
-/// A number with its error to two digits of that, without one to these decimals.
+/// A value with its uncertainty to two digits of that, without one to these decimals.
 fn with_error(value: f64, sigma: Option<f64>, digits: usize) -> String {
     match sigma {
         Some(sigma) => format!("{value:.0$} ± {sigma:.0$}", decimals(sigma)),
@@ -138,7 +137,7 @@ fn with_error(value: f64, sigma: Option<f64>, digits: usize) -> String {
     }
 }
 
-/// The same of a number above 0 whose logarithm is known: two errors where these differ.
+/// The same for a positive value whose logarithm is known: with two uncertainties where these differ.
 fn with_errors(value: f64, sigma: Option<f64>, digits: usize) -> String {
     match sigma.filter(|sigma| *sigma > UNEVEN * value) {
         Some(sigma) => {
@@ -151,28 +150,28 @@ fn with_errors(value: f64, sigma: Option<f64>, digits: usize) -> String {
 }
 
 impl SpotField {
-    /// The amplitude with its errors, where these are known.
+    /// The amplitude with its uncertainties, where these are known.
     pub fn amplitude(&self) -> String {
         with_errors(self.spot_amplitude, self.errors.sigma_spot_amplitude, 3)
     }
 
-    /// The slope of the spectrum with its error, where that is known.
+    /// The slope of the spectrum with its uncertainty, where that is known.
     pub fn slope(&self) -> String {
         with_error(self.spot_slope, self.errors.sigma_spot_slope, 2)
     }
 
-    /// The lifetime (d) with its errors, where these are known; `None` for static spots.
+    /// The lifetime (d) with its uncertainties, where these are known; `None` for static spots.
     pub fn lifetime_d(&self) -> Option<String> {
         let digits = |days: f64| if days < 1.0 { 2 } else { 1 };
         self.spot_lifetime_d.map(|days| with_errors(days, self.errors.sigma_spot_lifetime_d, digits(days)))
     }
 
-    /// The lifetime in words.
+    /// The lifetime as text.
     pub fn lifetime(&self) -> String {
         self.lifetime_d().map_or_else(|| "infinite (static)".to_owned(), |days| format!("{days} d"))
     }
 
-    /// What is to be said beside the number of that name.
+    /// The caveat on the parameter of that name.
     pub fn caveat(&self, name: &str) -> Option<&'static str> {
         let among = |names: &[String]| names.iter().any(|of| of == name);
         match (among(&self.at_bounds), among(&self.errors.unconstrained)) {
@@ -182,12 +181,13 @@ impl SpotField {
         }
     }
 
-    /// Shape of the spectrum in words.
+    /// Shape of the spectrum as text.
     pub fn spectrum(&self) -> &'static str {
         if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }
     }
 
-    /// That spots absorb anything, where they live as short as the search allows, and what may be wrong.
+    /// The remark that spots absorb anything, where their lifetime is the shortest of the search, and the possible
+    /// cause.
     pub fn absorbs(&self) -> Option<String> {
         let name = Parameter::SpotLifetime.name();
         let lifetime_d = self.spot_lifetime_d.filter(|days| *days < Parameter::SpotLifetime.usual())?;
@@ -200,7 +200,7 @@ impl SpotField {
         })
     }
 
-    /// That spots stand in for something else, where there are more than a star can have, and what that may be.
+    /// The remark that spots mimic something else, where their amplitude is impossible, and the possible cause.
     pub fn stands_in(&self) -> Option<Remark> {
         let amplitude = self.spot_amplitude;
         (amplitude > LARGEST_AMPLITUDE).then(|| {
@@ -213,7 +213,7 @@ impl SpotField {
         })
     }
 
-    /// What has to be known of it: bounds that it reached, and more spots than a star can have.
+    /// Remarks: bounds that were reached, and impossible spot amplitudes.
     pub fn remarks(&self) -> Vec<Remark> {
         let reached = |name: &String| {
             let is_of = |parameter: Parameter| *name == parameter.name();
@@ -231,7 +231,7 @@ impl SpotField {
         self.at_bounds.iter().map(reached).chain(self.stands_in()).collect()
     }
 
-    /// It in a line.
+    /// One line of text.
     pub fn line(&self) -> String {
         let SpotField { velocity_jitter_kms, ln_evidence, .. } = self;
         let (amplitude, slope, lifetime) = (self.amplitude(), self.slope(), self.lifetime());
@@ -246,22 +246,22 @@ impl SpotField {
 /// The orbit at one target of chi2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtTarget {
-    /// chi2 per datum asked for.
+    /// Requested chi2 per datum.
     pub chi2_target: f64,
     /// Whether the image reaches it before noise is turned into spots.
     pub on_target: bool,
-    /// The orbit; `None` where none is bounded, or no image.
+    /// The orbit; `None` where none is bounded, or without an image.
     pub orbit: Option<CircularOrbit>,
 }
 
-/// The profiles as the most probable maps explain them.
+/// The profiles with the model of the most probable maps.
 #[derive(Clone, Debug)]
 pub struct Explained {
-    /// Radial velocities, one a profile.
+    /// Radial velocities, one per profile.
     pub velocities: Vec<FilteredVelocity>,
     /// chi2 over the number of data.
     pub chi2_per_datum: f64,
-    /// What is not like noise in the residuals.
+    /// Deviations of the residuals from noise.
     pub misfit: Vec<String>,
 }
 
@@ -287,7 +287,7 @@ impl FilteredVelocity {
     }
 }
 
-/// Why a surface model says nothing.
+/// Errors of a surface model.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// No image.

@@ -1,6 +1,5 @@
-//! The maps that a surface model finds, and what they make of the profiles: model profiles, radial velocities before
-//! and after the spots are taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is
-//! judged.
+//! The maps of a surface model, and the results from them: model profiles, radial velocities before and after
+//! subtraction of the spots (Petit et al. 2015, section 3), and statistics of the fit.
 
 use super::checks::{Checks, Residual};
 use super::evolving_map::{FluxFit, NoFit, ReadingFit};
@@ -14,41 +13,41 @@ use crate::sampling::log_density::Status;
 use crate::star::observation::{Observations, Profile};
 use serde::{Deserialize, Serialize};
 
-/// Maps of a star, and what they make of the data.
+/// Maps of a star, and their models of the data.
 #[derive(Clone, Debug)]
 pub struct SurfaceMaps {
-    /// The maps in the order of time: one, one a season, or one at each time asked for.
+    /// The maps in the order of time: one, one per season, or one at each requested time.
     pub maps: Vec<SurfaceMap>,
-    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there
-    /// are any.
+    /// Model intensity of every bin, one vector per profile, in units of the continuum; including its nuisances, if
+    /// any.
     pub model: Vec<Vec<f64>>,
-    /// The same of static spots, where the maps evolve; `None` otherwise, and where such a star has no map.
+    /// The same for static spots, where the maps evolve; `None` otherwise, and where no static map is found.
     pub static_model: Option<Vec<Vec<f64>>>,
-    /// Radial velocities, one a profile.
+    /// Radial velocities, one per profile.
     pub velocities: Vec<VelocityWithoutSpots>,
-    /// Posterior mean of the nuisances of each profile, given its map; empty where none are integrated out.
+    /// Posterior mean of the nuisances of each profile, given its map; empty without marginalisation over them.
     #[doc(hidden)]
     pub nuisances: Vec<LineAndContinuum>,
     /// Posterior mean of each profile's velocity offset by the RV jitter (km/s), given its map; empty where there is no
     /// jitter.
     pub zero_points_kms: Vec<f64>,
-    /// Light curves, and what the maps make of them; mostly none.
+    /// Light curves with the model of the maps; usually none.
     #[doc(hidden)]
     pub light: Vec<FluxFit>,
-    /// Activity indicators that count, and what the maps make of them; mostly none.
+    /// Activity indicators in use with the model of the maps; usually none.
     #[doc(hidden)]
     pub readings: Vec<ReadingFit>,
     /// Images of other chi2, in order of falling chi2, where there is a target.
     #[doc(hidden)]
     pub trade_off: Vec<TradeOffNode>,
-    /// The spots as a field, where they are one.
+    /// The field of spots, if the model has one.
     pub field: Option<SpotField>,
     /// The star linearised with these maps, where they evolve.
     #[doc(hidden)]
     pub here: Option<Linearised>,
-    /// What has to be known of maps and times.
+    /// Warnings on maps and times.
     pub warnings: Vec<String>,
-    /// The numbers.
+    /// The statistics.
     pub summary: MapSummary,
     /// Whether the residuals look like noise.
     #[doc(hidden)]
@@ -58,12 +57,12 @@ pub struct SurfaceMaps {
 /// One map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceMap {
-    /// Time (d), of a map that evolves.
+    /// Time (d), for an evolving map.
     pub time_d: Option<f64>,
-    /// What the pixels hold: the spot filling factor, below 0 where it is brighter than the photosphere; or the
-    /// brightness.
+    /// Values of the pixels: the spot filling factor, below 0 where the surface is brighter than the photosphere; or
+    /// the brightness.
     pub pixels: Vec<f64>,
-    /// Its standard deviation, what is assumed of the field held; `None` where there is none.
+    /// Its standard deviation, with the field's parameters held; `None` where there is none.
     pub sigma: Option<Vec<f64>>,
 }
 
@@ -73,24 +72,24 @@ pub struct VelocityWithoutSpots {
     /// Its first moment, and that of the model.
     pub moments: FilteredVelocity,
     /// The most likely velocity relative to the systemic one, marginalised over maps, whatever the assumed orbit, and
-    /// its standard error, of which those of other profiles are not independent (km/s); NaN where the data do not bound
-    /// it, `None` where there is one map alone.
+    /// its standard error, which is correlated with those of other profiles (km/s); NaN where the data do not bound it,
+    /// `None` for a static map.
     pub marginalised_kms: Option<[f64; 2]>,
 }
 
-/// How good the fit is.
+/// Statistics of the fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapSummary {
-    /// How the reconstruction ended.
+    /// The end of the reconstruction.
     pub status: Status,
     /// chi2.
     pub chi2: f64,
     /// chi2 over the number of data.
     pub chi2_per_datum: f64,
-    /// That of static spots, where the maps evolve and there is a static one; absent otherwise.
+    /// That of static spots, where the maps evolve and a static one exists; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_per_datum_unchanging: Option<f64>,
-    /// The map as one of maximum entropy, where it is one.
+    /// The maximum-entropy image, if the map is one.
     #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub image: Option<ImageSummary>,
     /// Number of profiles.
@@ -108,16 +107,16 @@ pub struct MapSummary {
     /// Standard deviation of the first moments (km/s).
     #[serde(deserialize_with = "number_or_null")]
     pub observed_rv_rms_kms: f64,
-    /// Standard deviation of the first moments, those of the model taken out (km/s), where that means something.
+    /// Standard deviation of the first moments minus those of the model (km/s), where that is meaningful.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filtered_rv_rms_kms: Option<f64>,
-    /// Root mean square of the errors that photon noise makes in the first moments (km/s).
+    /// Root mean square of the photon-noise uncertainties of the first moments (km/s).
     #[serde(deserialize_with = "number_or_null")]
     pub photon_rv_error_kms: f64,
-    /// Standard deviation of the velocities, marginalised over maps (km/s), where they are.
+    /// Standard deviation of the velocities marginalised over maps (km/s), where available.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rv_rms_kms: Option<f64>,
-    /// Root mean square of their errors (km/s).
+    /// Root mean square of their uncertainties (km/s).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rv_error_kms: Option<f64>,
     /// Root mean square of observed minus modelled intensity.
@@ -125,11 +124,11 @@ pub struct MapSummary {
     /// The same over the core of the line: bins where the model is deeper than half its greatest depth.
     #[serde(deserialize_with = "number_or_null")]
     pub residual_rms_core: f64,
-    /// Root mean square of the standard errors of the intensities, scaled as the config says.
+    /// Root mean square of the standard errors of the intensities, scaled according to the config.
     pub sigma_rms: f64,
 }
 
-/// A map of maximum entropy in numbers.
+/// Statistics of a maximum-entropy map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageSummary {
     /// Target of chi2.
@@ -142,12 +141,12 @@ pub struct ImageSummary {
     pub entropy: f64,
     /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
-    /// Of an image of bright and dark pixels, what is darker and what is brighter than the photosphere.
+    /// For an image of bright and dark pixels, the parts darker and brighter than the photosphere.
     #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub deviation: Option<Deviation>,
     /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
     pub test: f64,
-    /// Applications of the response or its transpose, those for the trade-off curve included.
+    /// Applications of the response or its transpose, including those for the trade-off curve.
     #[serde(alias = "passes")]
     pub model_applications: u32,
     /// Newton steps of the last, exact solution.
@@ -173,9 +172,9 @@ impl Part for ImageSummary {
 /// Deviation from the brightness of the photosphere, means over the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
-    /// Mean of what pixels lack in brightness, 0 for bright ones.
+    /// Mean brightness deficit of pixels, 0 for bright ones.
     pub darkness: f64,
-    /// Mean of what they have too much, 0 for dark ones.
+    /// Mean brightness excess, 0 for dark ones.
     pub brightness_excess: f64,
 }
 
@@ -205,10 +204,10 @@ pub enum NoMaps {
     /// There is no most probable field.
     #[error(transparent)]
     Fit(#[from] NoFit),
-    /// No map can be asked for at these times.
+    /// No map is available at these times.
     #[error("{0}")]
     Times(&'static str),
-    /// The profiles know no spots.
+    /// The profiles show no spots.
     #[error(
         "the amplitude of the spots falls to the lower bound of its search, {0:.2}: the profiles show no spots; \
         observations.sigma_scale may be too large"
@@ -217,7 +216,7 @@ pub enum NoMaps {
 }
 
 impl NoMaps {
-    /// A name for it; `None` where the error says all.
+    /// A status for it; `None` where the error is sufficient.
     pub fn status(&self) -> Option<&'static str> {
         match self {
             NoMaps::Fit(error) => Some(error.status()),
@@ -228,7 +227,7 @@ impl NoMaps {
     }
 }
 
-/// Model profiles against the observed ones.
+/// Model profiles compared with the observed ones.
 pub(super) struct Against<'a> {
     pub imager: &'a Imager,
     pub observations: &'a Observations,
@@ -241,7 +240,7 @@ pub(super) struct Against<'a> {
 }
 
 impl<'a> Against<'a> {
-    /// Of model profiles of these depths.
+    /// From model profiles of these depths.
     pub fn new(imager: &'a Imager, observations: &'a Observations, values: ParameterValues, depths: &[&[f64]]) -> Self {
         let state = values.state();
         let moments = |(profile, depth): (&Profile, &&[f64])| {
@@ -267,7 +266,7 @@ impl<'a> Against<'a> {
         self.all().map(|r| r.scaled * r.scaled).sum()
     }
 
-    /// The numbers that all maps have, of this chi2.
+    /// The statistics common to all maps, with this chi2.
     pub fn summary(&self, status: Status, chi2: f64) -> MapSummary {
         let Against { imager, observations, values, moments, .. } = self;
         let star = imager.star.with(&values.state().surface);

@@ -1,21 +1,21 @@
-//! What is wrong alike in all profiles of a data set: a line or a continuum that is not quite the star's. Smooth in
-//! velocity, of an unknown size, and integrated out, so that no spots stand in for it (`docs/method.md` section 9).
+//! The error common to all profiles of a data set: a line or a continuum that differs slightly from the star's. Smooth
+//! in velocity, of an unknown size, and marginalised over, so that no spots mimic it (`docs/method.md` section 9).
 //!
-//! It is a Gaussian process of squared-exponential covariance in the observer's velocities, by weights of Gaussians
-//! that stand side by side.
+//! It is a Gaussian process with squared-exponential covariance in the observer's velocities, represented by weights of
+//! adjacent Gaussians.
 
 use super::imaging::Imager;
 use nalgebra::DMatrix;
 
-/// Correlation length (km/s); at most so many of them in the velocity range.
+/// Correlation length (km/s); there are at most so many of them in the velocity range.
 const LENGTH_KMS: f64 = 4.0;
 const MOST: f64 = 24.0;
 
-/// Size of the Gaussians for which the sum of their squares is 1: they stand a correlation length apart, and so wide
-/// are they.
+/// Height of the Gaussians for which the sum of their squares is 1: their spacing and width are a correlation length.
 const HEIGHT: f64 = 0.8932;
 
-/// Unit changes of the depths of each profile (bins, numbers): numbers are those of one data set after another.
+/// Unit changes of the depths of each profile (bins, columns): the columns of one data set follow those of the previous
+/// one.
 pub fn columns(imager: &Imager) -> Vec<DMatrix<f64>> {
     let ranges: Vec<(f64, f64)> = imager
         .sets

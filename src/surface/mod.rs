@@ -1,10 +1,10 @@
-//! What spots do to line profiles, behind one interface: a [`SurfaceModel`].
+//! The effect of spots on line profiles, behind one interface: a [`SurfaceModel`].
 //!
 //! There are two models: `static_map`, the map of maximum entropy (`docs/method.md` sections 2 to 4), and
-//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised (section 9). `settings` chooses one of
-//! them, and its [`Properties`], for an objective. A third model is one more folder here, an arm of these two
-//! `match`es, a name in [`ObjectiveKind`] and a kind of [`record`]; one with several numbers a pixel, or lines of its
-//! own, changes `star::response` and [`imaging`], too.
+//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised over (section 9). `settings` chooses one of
+//! them, and its [`Properties`], for an objective. A third model requires one more folder here, an arm of these two
+//! `match`es, a name in [`ObjectiveKind`] and a kind of [`record`]; with several values per pixel, or other local
+//! lines, it also changes `star::response` and [`imaging`].
 //!
 //! In: an [`Imager`](imaging::Imager), which has the star, when it was observed, and the data with their [`nuisances`]
 //! and light curves ([`photometry`]); [`calibration`] measures their uncertainties. Out: ln L to second order in the
@@ -33,7 +33,7 @@ mod settings;
 pub mod static_map;
 pub mod surrogate;
 
-/// What profiles that are not yet taken will say of velocities: spots that evolve, whatever the config's objective.
+/// Expected constraints of planned profiles on velocities: with evolving spots, whatever the config's objective.
 pub mod planned {
     pub use super::evolving_map::{Assumed, Basis, Marginal, Planned, fit};
 }

@@ -1,4 +1,4 @@
-//! The interface of surface models: what is assumed of the spots, and what the profiles then say.
+//! The interface of surface models: the assumptions on the spots, and the resulting constraints from the profiles.
 
 use super::density::Density;
 use super::expansion::{Expansion, Nuisance};
@@ -15,62 +15,62 @@ use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
 use std::fmt::Debug;
 
-/// Star and data, and what is integrated out with the velocities.
+/// Star and data, and the parameters that are marginalised over with the velocities.
 #[derive(Clone, Copy, Debug)]
 pub struct At<'a> {
     /// Star, times and data.
     pub imager: &'a Imager,
     /// The parameters of star and orbit.
     pub values: ParameterValues,
-    /// Parameters that are integrated out within their priors; the others are fixed.
+    /// Parameters that are marginalised over within their priors; the others are fixed.
     pub nuisances: &'a [Nuisance],
 }
 
-/// What is made of the velocities of some profiles: an orbit at a period.
+/// A function of the velocities of some profiles: an orbit at a period.
 pub type OrbitOf<'a> = &'a (dyn Fn(&VelocityQuadratic) -> Option<CircularOrbit> + Sync);
 
-/// What a model is, before there are data: what a config may ask of it, and what it leaves to be measured beforehand.
+/// Properties of a model, before there are data: what a config may require of it, and what must be measured beforehand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Properties {
-    /// Its name. Images, jitters and fields of two models are not the same quantities.
+    /// Its name. Images, jitters and fields of two models are different quantities.
     pub name: &'static str,
-    /// What is under way while it looks for maps, in words.
+    /// The current stage of the search for maps, as text.
     pub under_way: &'static str,
-    /// Whether the map changes all the time: seasons need no maps of their own, and what one map leaves over is not
+    /// Whether the map evolves continuously: seasons then need no separate maps, and the residuals of one map are not
     /// noise.
     pub map_changes: bool,
-    /// Whether velocity jitter and velocity offsets of data sets are integrated out with the maps; otherwise they are
-    /// settled beforehand.
+    /// Whether RV jitter and RV offsets of data sets are marginalised over together with the maps; otherwise they are
+    /// fixed beforehand.
     pub marginalises: bool,
-    /// Whether spots are a field, of an amplitude, a slope and a lifetime.
+    /// Whether spots are a field with an amplitude, a slope and a lifetime.
     pub has_field: bool,
-    /// Whether it takes light curves beside the profiles.
+    /// Whether it uses light curves beside the profiles.
     pub takes_light_curves: bool,
-    /// Whether it is one map at a target chi2, which leaves spots unresolved.
+    /// Whether it is one map at a target chi2, with unresolved spots.
     pub has_target: bool,
 }
 
-/// What is assumed of the spots, and what the profiles then say.
+/// A surface model: assumptions on the spots, and the resulting constraints from the profiles.
 pub trait SurfaceModel: Debug + Send + Sync {
-    /// ln L to second order around the star at some parameters; maps are found from those of a star `near` by.
+    /// ln L to second order around the star at some parameters; maps are found from those of a star `near`.
     ///
     /// # Errors
     /// [`SurfaceError`].
     fn linearise(&self, at: At, near: Option<&Linearised>) -> Result<Linearised, SurfaceError>;
 
-    /// The quadratic of the orbit's velocities in an expansion of this model, whose gradient may be another one than
-    /// that of the data: spots that the map does not resolve count as noise of the size that the gradient says.
+    /// The quadratic of the orbit's velocities in an expansion of this model, whose gradient may differ from that of
+    /// the data: unresolved spots count as noise of the size that the gradient implies.
     fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic>;
 
-    /// The star as it is `here` without its velocity jitter, where the profiles are to say how large that is; `None`
-    /// where it is given, or there is none.
+    /// The star `here` without its RV jitter, where the profiles are to constrain it; `None` where it is given, or
+    /// there is none.
     ///
     /// # Errors
     /// [`SurfaceError`].
     fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError>;
 
-    /// The star as it is `here` with fields of spots that absorb less and more of an orbit, in even steps along a line,
-    /// where spots are a field; none otherwise.
+    /// The star `here` with fields of spots that absorb less and more of an orbit, in even steps along a line, where
+    /// spots are a field; none otherwise.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -78,13 +78,13 @@ pub trait SurfaceModel: Debug + Send + Sync {
         Ok(Vec::new())
     }
 
-    /// The same model with what was fitted of the spots held.
+    /// The same model with the fitted parameters of the spots held.
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel>;
 
-    /// Whether the spots evolve, where the model takes them for static; `None` where that is not asked.
+    /// Whether the spots evolve, where the model assumes static ones; `None` where that is not tested.
     fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>>;
 
-    /// Whether spots imitate orbits at fractions of the rotation period, too.
+    /// Whether spots also mimic orbits at fractions of the rotation period.
     fn imitates_at_fractions(&self) -> bool;
 
     /// An orbit without each of these groups of profiles (ascending).
@@ -99,13 +99,13 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// An orbit at other targets of chi2; none where there is no target.
     fn at_other_targets(&self, at: At, orbit: OrbitOf) -> Vec<AtTarget>;
 
-    /// The profiles as the most probable maps explain them.
+    /// The profiles with the model of the most probable maps.
     fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained;
 
-    /// How well the profiles tell the field of spots; nothing where there is none.
+    /// Uncertainties of the field of spots; empty where there is none.
     fn field_errors(&self, imager: &Imager, here: &Linearised) -> FieldErrors;
 
-    /// What has to be known of the maps.
+    /// Remarks on the maps.
     fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark>;
 
     /// The maps at the values of `at`, of these times (d) where they are given and the maps evolve.
@@ -128,8 +128,8 @@ pub trait SurfaceModel: Debug + Send + Sync {
         report: &(dyn Fn(Progress) + Sync),
     ) -> Result<Best, SearchError>;
 
-    /// The density of `space` around a reference that was recorded, which is rebuilt to the same bits; what the record
-    /// lacks is as in `others`.
+    /// The density of `space` around a recorded reference, which is rebuilt to the same bits; values missing in the
+    /// record are as in `others`.
     ///
     /// # Errors
     /// [`RebuildError`].

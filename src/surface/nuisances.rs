@@ -1,13 +1,13 @@
-//! What may be wrong with each observed profile by itself: the level and the slope of its continuum, the equivalent
-//! width of its line, and the zero point of its velocity; each with a Gaussian prior, and integrated out.
+//! Errors of each observed profile by itself: the level and the slope of its continuum, the equivalent width of its
+//! line, and its RV jitter; each with a Gaussian prior, and marginalised over.
 //!
-//! The observed depth is linear in the three, `d = D - offset - slope x + equivalent_width M + noise`, with x from -1
-//! to 1 along the profile and M the mean of all observed profiles. So integrating them out is exact and only changes
-//! the covariance of a profile's bins to `Sigma = diag(sigma^2) + T P T^t`: a chi2 of `r Sigma^-1 r` has as many
-//! degrees of freedom as there are bins, as ever. A zero point z, small against the width of the line, adds one more
-//! term `+ z D'` with D' the derivative of the depths with velocity, which is the star's and comes from outside. With
-//! the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is `sigma^-1 (1 - Q s^2/(1+s^2) Q^t) sigma^-1`:
-//! one product of two vectors a template.
+//! The observed depth is linear in the first three, `d = D - offset - slope x + equivalent_width M + noise`, with x
+//! from -1 to 1 along the profile and M the mean of all observed profiles. So marginalisation over them is exact and
+//! only changes the covariance of a profile's bins to `Sigma = diag(sigma^2) + T P T^t`: a chi2 of `r Sigma^-1 r` still
+//! has as many degrees of freedom as there are bins. A velocity offset z by the jitter, small compared with the width
+//! of the line, adds one more term `+ z D'` with D' the derivative of the depths with velocity, which depends on the
+//! star and is given. With the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is `sigma^-1 (1 - Q
+//! s^2/(1+s^2) Q^t) sigma^-1`: one scalar product per template.
 
 use crate::numerics::vector::Instructions;
 use crate::numerics::vector::linear::short_dot;
@@ -41,38 +41,38 @@ impl LineAndContinuum {
     }
 }
 
-/// How the depth in bin `j` of `bins` changes with each of the three, in a profile of that depth there.
+/// Derivatives of the depth in bin `j` of `bins` with each of the three, in a profile with that depth there.
 pub fn templates(j: usize, bins: usize, depth: f64) -> [f64; 3] {
     let half = 0.5 * (bins as f64 - 1.0);
     [-1.0, -(j as f64 - half) / half.max(0.5), depth]
 }
 
-/// What was found in one profile.
+/// Estimates for one profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// Line and continuum.
     pub line_and_continuum: LineAndContinuum,
-    /// Zero point of the velocity (km/s).
+    /// Velocity offset by the RV jitter (km/s).
     pub zero_point_kms: f64,
 }
 
-/// Place of the zero point among the templates, behind those of line and continuum.
+/// Index of the RV jitter among the templates, after those of line and continuum.
 const ZERO_POINT: usize = 3;
 
-/// The nuisances of a set of profiles; none by default. Vectors are as long as the data, all profiles one after the
+/// The nuisances of a set of profiles; none by default. Vectors have the length of the data, all profiles one after the
 /// other.
 #[derive(Clone, Debug, Default)]
 pub struct Nuisances {
     /// Standard deviations of the priors of line and continuum, of each bin; empty without any.
     priors: Vec<[f64; 3]>,
-    /// Standard deviation of the velocity zero points (km/s).
+    /// RV jitter (km/s).
     zero_point_kms: f64,
     /// Change of the depths per standard deviation of the prior, for each that is not fixed.
     templates: Vec<(usize, Vec<f64>)>,
     corrections: Vec<Correction>,
 }
 
-/// One direction in the space of a profile's bins in which the data say less than their errors promise.
+/// One direction in the space of a profile's bins in which the nuisances reduce the information of the data.
 #[derive(Clone, Debug)]
 struct Correction {
     /// The weights are `1/sigma^2 - full full^t`.
@@ -82,12 +82,12 @@ struct Correction {
 }
 
 impl Nuisances {
-    /// Of `observations`, with priors of these standard deviations; a standard deviation of 0 fixes a nuisance at 0.
+    /// For `observations`, with priors of these standard deviations; a standard deviation of 0 fixes a nuisance at 0.
     pub fn new(priors: LineAndContinuum, observations: &Observations) -> Self {
         Nuisances::of_sets(&[(priors, observations)])
     }
 
-    /// Of several data sets, one after the other, each with priors of its own.
+    /// For several data sets, one after the other, each with its own priors.
     pub fn of_sets(sets: &[(LineAndContinuum, &Observations)]) -> Self {
         let profiles = || sets.iter().flat_map(|(_, set)| &set.profiles);
         let rows: Vec<[f64; 3]> =
@@ -107,8 +107,8 @@ impl Nuisances {
         Nuisances { priors, templates, ..Nuisances::default() }.of_profiles(&bins, &sigma)
     }
 
-    /// The same with velocity zero points of this standard deviation (km/s) in place of those that there were. The
-    /// derivatives of the depths with velocity are `slopes`; profiles have these `bins`, of errors `sigma`.
+    /// The same with an RV jitter of this standard deviation (km/s) instead of the previous one. The derivatives of the
+    /// depths with velocity are `slopes`; profiles have these `bins`, of uncertainties `sigma`.
     pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64], bins: &[Range<usize>], sigma: &[f64]) -> Self {
         self.templates.retain(|(i, _)| *i != ZERO_POINT);
         self.zero_point_kms = sd_kms;
@@ -118,7 +118,7 @@ impl Nuisances {
         self.of_profiles(bins, sigma)
     }
 
-    /// Those of the profiles with these `bins` alone, whose bins have the errors `sigma`, one after the other.
+    /// Those of the profiles with these `bins` alone, whose bins have the uncertainties `sigma`, one after the other.
     pub fn of_profiles(&self, profiles: &[Range<usize>], sigma: &[f64]) -> Self {
         let kept = |(i, template): &(usize, Vec<f64>)| {
             (*i, profiles.iter().flat_map(|bins| template[bins.clone()].to_vec()).collect())
@@ -136,11 +136,11 @@ impl Nuisances {
         Nuisances { priors: priors.collect(), zero_point_kms: self.zero_point_kms, templates, corrections }
     }
 
-    /// How the depths of the profile with these `bins` change with line and continuum, per standard deviation of their
-    /// priors (bins, nuisances).
+    /// Derivatives of the depths of the profile with these `bins` with line and continuum, per standard deviation of
+    /// their priors (bins, nuisances).
     pub fn line_and_continuum_of(&self, bins: Range<usize>) -> DMatrix<f64> {
         let columns = self.templates.iter().filter(|(i, _)| *i != ZERO_POINT).map(|(_, all)| &all[bins.clone()]);
-        // what is none of this data set's is no column
+        // nuisances of other data sets have no column
         let columns: Vec<&[f64]> = columns.filter(|own| own.iter().any(|x| *x != 0.0)).collect();
         DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][j])
     }
@@ -155,7 +155,7 @@ impl Nuisances {
         self.templates.iter().any(|(i, _)| *i != ZERO_POINT)
     }
 
-    /// Standard deviation of the velocity zero points (km/s); 0 where there are none.
+    /// RV jitter (km/s); 0 without one.
     pub fn zero_point_kms(&self) -> f64 {
         self.zero_point_kms
     }
@@ -179,7 +179,7 @@ impl Nuisances {
     }
 
     /// The posterior mean of the nuisances of the profile with these `bins`, given the weighted residual `W (model -
-    /// data)`; the change of its depths that they make is added to `depth`.
+    /// data)`; their change of its depths is added to `depth`.
     pub fn estimate(&self, bins: Range<usize>, weighted_residual: &[f64], depth: &mut [f64]) -> Estimate {
         let mut numbers = [0.0; ZERO_POINT + 1];
         let [offset, slope, width] = self.priors.get(bins.start).copied().unwrap_or_default();
@@ -201,7 +201,7 @@ fn templates_of(profile: &Profile, observations: &Observations) -> Vec<[f64; 3]>
     let mean = |j: usize| {
         let velocity = profile.velocity_kms(j);
         let (sum, count) = observations.profiles.iter().fold((0.0, 0.0), |(sum, count), other| {
-            // rounding of VRAD does not lose the last bin
+            // rounding of VRAD must not lose the last bin
             let position = (velocity - other.first_velocity_kms) / other.step_kms;
             match position > -1e-6 && position < other.intensity.len() as f64 - 1.0 + 1e-6 {
                 true => (sum + 1.0 - other.intensity_at(velocity), count + 1.0),
@@ -213,8 +213,8 @@ fn templates_of(profile: &Profile, observations: &Observations) -> Vec<[f64; 3]>
     (0..bins).map(|j| templates(j, bins, mean(j))).collect()
 }
 
-/// Appends what the `templates` (columns, in standard deviations of the prior) of a profile with these errors make of
-/// its weights.
+/// Appends the corrections of the weights by the `templates` (columns, in standard deviations of the prior) of a
+/// profile with these uncertainties.
 fn correct(templates: &DMatrix<f64>, sigma: &[f64], corrections: &mut [Correction]) {
     if corrections.is_empty() {
         return;
@@ -223,10 +223,10 @@ fn correct(templates: &DMatrix<f64>, sigma: &[f64], corrections: &mut [Correctio
     let svd = whitened.svd(true, false);
     let basis = svd.u.expect("asked for");
     for (column, correction) in corrections.iter_mut().enumerate() {
-        // a profile of fewer bins than templates has fewer directions
+        // a profile with fewer bins than templates has fewer directions
         let s2 = svd.singular_values.get(column).map_or(0.0, |s| s * s);
         let full = (s2 / (1.0 + s2)).sqrt();
-        // q^t x costs 1 - 1/sqrt(1+s^2) of itself; `full` holds its root of s^2/(1+s^2)
+        // `half` times `full` is 1 - 1/sqrt(1+s^2); `full` is the root of s^2/(1+s^2)
         let half = full / (1.0 + (1.0 + s2).sqrt().recip());
         for (j, sigma) in sigma.iter().enumerate() {
             let q = if s2 > 0.0 { basis[(j, column)] } else { 0.0 };

@@ -1,4 +1,4 @@
-//! The objectives by name (`docs/method.md` section 3), and what is known of the spots that a map leaves over.
+//! The objectives by name (`docs/method.md` section 3), and settings of unresolved spots.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

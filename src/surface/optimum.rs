@@ -1,4 +1,4 @@
-//! What a search for the best parameters says, whatever the surface model, and the steps that all of them share.
+//! The results of a search for the best parameters, whatever the surface model, and its common steps.
 
 use super::density::Density;
 use super::evolving_map::NoFit;
@@ -8,23 +8,23 @@ use crate::field::FieldError;
 use crate::model::{ParameterSpace, ParameterValues, Prior};
 use crate::sampling::optimise::{OptimiseError, Optimum};
 
-/// What is sought.
+/// The problem of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct Sought<'a> {
     /// Star, times and data.
     pub imager: &'a Imager,
     /// The free parameters.
     pub space: &'a ParameterSpace,
-    /// Most other orbits to start from, beside the config's values.
+    /// Largest number of other orbits to start from, beside the config's values.
     pub other_starts: usize,
     /// Seed of those that are drawn.
     pub seed: u64,
 }
 
-/// Where a blind search leads.
+/// A start from a blind search.
 #[derive(Clone, Debug)]
 pub struct BlindStart<'a> {
-    /// The orbit that it found, where the priors allow it, and the spots with it (physical coordinates).
+    /// Its orbit, where the priors allow it, and the spots with it (physical coordinates).
     pub theta: Vec<f64>,
     /// The same as values of all parameters.
     pub values: ParameterValues,
@@ -32,16 +32,16 @@ pub struct BlindStart<'a> {
     pub here: &'a super::Linearised,
 }
 
-/// One start of the search and where it led.
+/// One start of the search and its end.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// Where it started (physical coordinates); the first attempt is from the config's values.
+    /// The start (physical coordinates); the first attempt is from the config's values.
     pub start: Vec<f64>,
-    /// Where it ended, or why it did not.
+    /// The end, or its error.
     pub end: Result<Optimum, OptimiseError>,
 }
 
-/// What a surface model finds.
+/// The result of a surface model.
 #[derive(Clone, Debug)]
 pub struct Best {
     /// The posterior relative to the reference at the optimum.
@@ -61,7 +61,7 @@ pub enum SearchError {
     /// No field.
     #[error("{0}")]
     Field(#[from] NoFit),
-    /// No start led anywhere.
+    /// No start was successful.
     #[error("{0}")]
     Optimise(#[from] OptimiseError),
 }
@@ -72,10 +72,10 @@ impl From<FieldError> for SearchError {
     }
 }
 
-/// How far a search has come.
+/// Progress of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// What it is at.
+    /// The stage.
     pub stage: Stage,
     /// Evaluations made by all climbs so far.
     pub evaluations: usize,
@@ -95,7 +95,7 @@ pub enum Stage {
     },
     /// The reference at the best parameters.
     Reference,
-    /// The last climb, on the objective asked for.
+    /// The last climb, on the requested objective.
     Refining,
 }
 
@@ -110,7 +110,7 @@ impl std::fmt::Display for Stage {
     }
 }
 
-/// Peaks of the quadratic this much below its best in ln L are climbed too.
+/// Peaks of the quadratic at most this far below its best in ln L are climbed too.
 pub(super) const PEAK_DROP: f64 = 10.0;
 
 /// The reference is rebuilt until the optimum stays within this many standard deviations of it.
@@ -119,7 +119,7 @@ pub(super) const REFERENCE_SHIFT: f64 = 0.3;
 /// Climbs that end within this many standard deviations of each other found the same maximum.
 pub(crate) const RIVAL_DISTANCE: f64 = 4.0;
 
-/// `theta` brought into the bounds of the priors, a little inside.
+/// `theta` moved into the bounds of the priors, slightly inside.
 pub(crate) fn within(space: &ParameterSpace, mut theta: Vec<f64>) -> Vec<f64> {
     for (x, f) in theta.iter_mut().zip(space.free()) {
         let (low, high) = f.prior.bounds();
@@ -131,7 +131,7 @@ pub(crate) fn within(space: &ParameterSpace, mut theta: Vec<f64>) -> Vec<f64> {
     theta
 }
 
-/// `theta` with the spots of `values` where they are free, brought into their priors.
+/// `theta` with the spots of `values` where they are free, moved into their priors.
 pub(crate) fn with_spots_of(space: &ParameterSpace, mut theta: Vec<f64>, values: &ParameterValues) -> Vec<f64> {
     for (x, f) in theta.iter_mut().zip(space.free()).filter(|(_, f)| f.parameter.is_of_field()) {
         *x = values[f.parameter];

@@ -1,5 +1,5 @@
-//! Light curves: measurements of the star's flux, brought to few bins and to segments of a level and slope of their
-//! own, in units of the mean flux of a segment (`docs/method.md` section 9).
+//! Light curves: measurements of the star's flux, averaged in few bins and divided into segments, each with its own
+//! level and slope, in units of the mean flux of a segment (`docs/method.md` section 9).
 
 mod outliers;
 
@@ -14,7 +14,7 @@ pub struct Flux {
     pub time_d: f64,
     /// Flux, in any units.
     pub flux: f64,
-    /// Its standard error, in the same.
+    /// Its standard error, in the same units.
     pub sigma: f64,
 }
 
@@ -31,7 +31,7 @@ pub struct FluxBin {
     pub sigma: f64,
     /// Number of the segment, from 0.
     pub segment: usize,
-    /// Where in the segment it is: -1 at the start, 1 at the end.
+    /// Position in the segment: -1 at the start, 1 at the end.
     pub place: f64,
 }
 
@@ -40,7 +40,7 @@ pub struct FluxBin {
 pub struct LightCurve {
     /// Its name.
     pub name: String,
-    /// What of the star looks different in it.
+    /// The photometric band.
     pub band: Band,
     /// The bins, in the order of time.
     pub bins: Vec<FluxBin>,
@@ -48,11 +48,11 @@ pub struct LightCurve {
     pub segments: usize,
 }
 
-/// Bins of a rotation, from what loses nothing to what spots of a quarter of the disc still need.
+/// Bins per rotation, from lossless to the minimum for spots of a quarter of the disc.
 const BINS_OF_A_ROTATION: [f64; 5] = [50.0, 36.0, 25.0, 18.0, 12.0];
 
-/// More bins than this of all light curves are too many: each is a row of the covariance of the data. Profiles know the
-/// spots' places better, and a light curve how they change from rotation to rotation.
+/// Largest number of bins of all light curves: each is a row of the covariance of the data. Profiles constrain the
+/// positions of spots better; light curves constrain their change from rotation to rotation.
 pub const MOST_BINS: usize = 200;
 
 /// Width of the bins (d) of light curves, given the times (d) of each, of a star with this rotation period (d): a 1/50
@@ -63,7 +63,7 @@ pub fn bin_width_d(times_d: &[Vec<f64>], rotation_period_d: f64) -> f64 {
     widths.into_iter().find(|width| count(*width) <= MOST_BINS).unwrap_or(widths[widths.len() - 1])
 }
 
-/// Number of cells of a width (d), counted from the first of these times (d), that hold any of them.
+/// Number of occupied cells of a width (d), counted from the first of these times (d).
 fn filled(times_d: &[f64], width_d: f64) -> usize {
     times_d.chunk_by(|a, b| cell(*a, times_d[0], width_d) == cell(*b, times_d[0], width_d)).count()
 }
@@ -72,7 +72,7 @@ fn cell(time_d: f64, first_d: f64, width_d: f64) -> f64 {
     ((time_d - first_d) / width_d).floor()
 }
 
-/// Measurements in the order of time, parted where a gap is longer than `gap_d` (d).
+/// Measurements in the order of time, split where a gap is longer than `gap_d` (d).
 fn segments(measured: &[Flux], gap_d: f64) -> impl Iterator<Item = &[Flux]> {
     measured.chunk_by(move |a, b| b.time_d - a.time_d <= gap_d)
 }
@@ -84,8 +84,8 @@ fn cells(segment: &[Flux], width_d: f64) -> impl Iterator<Item = &[Flux]> {
 }
 
 impl LightCurve {
-    /// Of measurements in the order of time, in bins of a width (d), a new segment after each gap that is longer than
-    /// `gap_d` (d). Errors of neighbouring measurements are taken for independent.
+    /// From measurements in the order of time, in bins of a width (d), with a new segment after each gap that is longer
+    /// than `gap_d` (d). Errors of neighbouring measurements are assumed independent.
     pub fn new(name: &str, band: Band, measured: &[Flux], width_d: f64, gap_d: f64) -> Self {
         let mut bins = Vec::new();
         let mut segments = 0;
@@ -106,7 +106,7 @@ impl LightCurve {
     }
 }
 
-/// Measurements in the order of time, the weighted means of those in cells of a width (d).
+/// Weighted means, in the order of time, of the measurements in cells of a width (d).
 pub fn in_bins(measured: &[Flux], width_d: f64) -> Vec<Flux> {
     let bin = |measured: &[Flux]| {
         let FluxBin { time_d, flux, sigma, .. } = mean(measured, 0);
@@ -115,13 +115,13 @@ pub fn in_bins(measured: &[Flux], width_d: f64) -> Vec<Flux> {
     cells(measured, width_d).map(bin).collect()
 }
 
-/// The mean of measurements, by their weights.
+/// The weighted mean of measurements.
 fn mean(measured: &[Flux], segment: usize) -> FluxBin {
     let total: f64 = measured.iter().map(|one| one.sigma.powi(-2)).sum();
     let of = |number: &dyn Fn(&Flux) -> f64| {
         measured.iter().map(|one| number(one) * one.sigma.powi(-2)).sum::<f64>() / total
     };
-    // from the first, for times are far from 0
+    // relative to the first, because times are far from 0
     let first = measured[0].time_d;
     let since = of(&|one| one.time_d - first);
     let spread_d = of(&|one| (one.time_d - first - since).powi(2)).sqrt();

@@ -1,4 +1,4 @@
-//! What is written of the reference that every evaluation starts from, and what it is rebuilt from to the same bits.
+//! The record of the reference that every evaluation starts from, from which it is rebuilt to the same bits.
 
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
@@ -7,7 +7,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// What every evaluation starts from.
+/// The record of a reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct SurfaceRecord(Reference);
@@ -42,8 +42,9 @@ pub struct ImageRecord {
 }
 
 impl ImageRecord {
-    /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
-    /// spottedness explodes, and the answer hangs on the target (`docs/method.md` section 3).
+    /// Warning for a target that may be unreachable in another noise realisation, which moves the attainable chi2 by
+    /// sqrt(2/N): there spottedness increases steeply, and the result depends on the target (`docs/method.md` section
+    /// 3).
     fn warning(&self) -> Option<String> {
         let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
         (self.chi2_target - self.chi2_reach < noise).then(|| {
@@ -59,16 +60,16 @@ impl ImageRecord {
     }
 }
 
-/// The most probable maps, one a profile.
+/// The most probable maps, one per profile.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FieldRecord {
-    /// All parameters, those of the field among them; without a lifetime spots live for ever.
+    /// All parameters, including those of the field; without a lifetime spots are static.
     pub parameters: BTreeMap<String, f64>,
     /// Degree below which the spectrum of the spots is flat.
     #[serde(default)]
     pub spot_break_degree: f64,
-    /// Scatter of the profiles' velocity zero points (km/s).
+    /// RV jitter of the profiles (km/s).
     pub velocity_jitter_kms: f64,
     /// ln of the evidence.
     pub ln_evidence: f64,
@@ -76,15 +77,15 @@ pub struct FieldRecord {
     pub data: usize,
 }
 
-/// Above this vsini (km/s) evolving maps are too sure of some parameters, by a factor.
+/// Above this vsini (km/s) evolving maps underestimate the uncertainties of some parameters, by a factor.
 const FAST_KMS: f64 = 45.0;
 const TOO_SURE: [Parameter; 3] = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination];
 const WIDENING: f64 = 1.6;
 
 impl FieldRecord {
-    /// Parameters of the field that lie on a bound of its search, and free ones whose uncertainties are widened.
+    /// Parameters of the field that lie on a bound of its search, and free ones whose uncertainties are inflated.
     fn warnings(&self, free: &[String]) -> Vec<String> {
-        /// Nearer than this part a bound is reached.
+        /// A bound is reached within this fraction.
         const REACHED: f64 = 0.01;
         let on_bound = |p: &Parameter| {
             let (value, (low, high)) = (*self.parameters.get(p.name())?, p.widest());
@@ -100,13 +101,13 @@ impl FieldRecord {
         Parameter::FIELD.iter().filter_map(on_bound).chain(self.widened(free)).collect()
     }
 
-    /// By how much the uncertainty of a parameter has to be multiplied (`results/calibration-stellar.md`).
+    /// The factor on the uncertainty of a parameter (`results/calibration-stellar.md`).
     fn widening(&self, p: Parameter) -> Option<f64> {
         let is_fast = *self.parameters.get(Parameter::Vsini.name())? > FAST_KMS;
         (is_fast && TOO_SURE.contains(&p)).then_some(WIDENING)
     }
 
-    /// Which uncertainties are multiplied.
+    /// The list of inflated uncertainties.
     fn widened(&self, free: &[String]) -> Option<String> {
         let of = TOO_SURE.into_iter().filter(|p| free.iter().any(|free| free == p.name()));
         let of: Vec<&str> = of.filter(|p| self.widening(*p).is_some()).map(Parameter::name).collect();
@@ -120,7 +121,7 @@ impl FieldRecord {
     }
 }
 
-/// By the key that one of them has, so that an error is about that one.
+/// Distinguished by a key that only one of them has, so that an error refers to that one.
 impl<'de> Deserialize<'de> for SurfaceRecord {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = serde_json::Value::deserialize(deserializer)?;
@@ -132,7 +133,7 @@ impl<'de> Deserialize<'de> for SurfaceRecord {
     }
 }
 
-/// A reference that is not what it was.
+/// Errors of a rebuilt reference.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RebuildError {
     /// No image at the recorded parameters.
@@ -141,23 +142,23 @@ pub enum RebuildError {
     /// No maps there.
     #[error(transparent)]
     Field(#[from] FieldError),
-    /// It comes out differently.
+    /// The result differs.
     #[error("the reference differs on this machine ({what} {now:e} instead of {then:e})")]
     Differs {
-        /// Which of its numbers.
+        /// Name of the differing value.
         what: &'static str,
-        /// That number then.
+        /// The recorded value.
         then: f64,
-        /// And now.
+        /// The new value.
         now: f64,
     },
-    /// It is of another objective.
+    /// It belongs to another objective.
     #[error("the reference is that of another objective than the config's")]
     OtherObjective,
 }
 
 impl RebuildError {
-    /// That a number is what it was, to the bit.
+    /// Checks that a value is unchanged, to the bit.
     pub(super) fn check(what: &'static str, then: f64, now: f64) -> Result<(), Self> {
         match then.to_bits() == now.to_bits() {
             true => Ok(()),
@@ -175,7 +176,7 @@ impl SurfaceRecord {
         }
     }
 
-    /// What has to be known of it, and of the parameters that are free.
+    /// Warnings on it, and on the free parameters.
     pub fn warnings(&self, free: &[String]) -> Vec<String> {
         match &self.0 {
             Reference::Image(record) => record.warning().into_iter().collect(),
@@ -183,7 +184,7 @@ impl SurfaceRecord {
         }
     }
 
-    /// By how much the uncertainty of a parameter has to be multiplied, where it comes out too small.
+    /// The factor on the uncertainty of a parameter, where it is underestimated.
     pub fn widening(&self, p: Parameter) -> Option<f64> {
         match &self.0 {
             Reference::Image(_) => None,
@@ -191,7 +192,7 @@ impl SurfaceRecord {
         }
     }
 
-    /// All parameters; those missing in the record are taken from `others`, but for a lifetime: without one spots are
+    /// All parameters; those missing in the record are taken from `others`, except a lifetime: without one spots are
     /// static.
     pub fn values(&self, others: &ParameterValues) -> ParameterValues {
         let mut values = *others;
@@ -229,7 +230,7 @@ impl From<FieldRecord> for SurfaceRecord {
     }
 }
 
-/// The values that are given, by name.
+/// The given values, by name.
 pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
     Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.get(p)?))).collect()
 }

@@ -1,4 +1,4 @@
-//! The choice of a surface model for an objective: the one place that knows them all.
+//! The choice of a surface model for an objective: the only place with all models.
 
 use super::evolving_map::{EvolvingMap, Known};
 use super::model::{Properties, SurfaceModel};
@@ -6,20 +6,20 @@ use super::objective::ObjectiveKind;
 use super::static_map::StaticMap;
 use serde::{Deserialize, Serialize};
 
-/// A surface model as a config asks for it.
+/// A surface model according to a config.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceSettings {
     /// The objective.
     pub objective: ObjectiveKind,
     /// Target of chi2, per datum, where there is one.
     pub chi2_target: f64,
-    /// What is known of the spots as a field that evolves. Where they are taken for static, whether they are is looked
-    /// into with it; without it that is not asked.
+    /// Prior knowledge of an evolving field of spots. For a static model, spot evolution is tested with it, and not
+    /// tested without it.
     pub field: Option<Known>,
 }
 
 impl ObjectiveKind {
-    /// What its model is.
+    /// The properties of its model.
     pub fn properties(self) -> &'static Properties {
         match self {
             ObjectiveKind::MarginalLikelihood => &EvolvingMap::PROPERTIES,
@@ -31,12 +31,12 @@ impl ObjectiveKind {
 }
 
 impl SurfaceSettings {
-    /// The map of fewest spots at a target chi2 per datum, of a star of which it is not asked whether it evolves.
+    /// The map of fewest spots at a target chi2 per datum, without a test for spot evolution.
     pub fn spottedness(chi2_target: f64) -> Self {
         SurfaceSettings { objective: ObjectiveKind::Spottedness, chi2_target, field: None }
     }
 
-    /// The same, without asking whether spots that are taken for static are.
+    /// The same, without testing whether static spots evolve.
     pub fn without_comparison(self) -> Self {
         let field = self.field.filter(|_| self.objective.properties().has_field);
         SurfaceSettings { field, ..self }

@@ -1,5 +1,5 @@
-//! Colours that survive colour blindness (Okabe & Ito 2008) and colour maps of steadily rising or falling lightness,
-//! which survive grey print too.
+//! Colours distinguishable with colour blindness (Okabe & Ito 2008), and colour maps of monotonic lightness, which
+//! remain readable in grey print.
 
 /// A colour: red, green, blue, and opacity in 255ths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +27,11 @@ impl Colour {
 pub const BLACK: Colour = Colour::hex(0x000000);
 /// White.
 pub const WHITE: Colour = Colour::hex(0xffffff);
-/// Grey, for what stands in the background.
+/// Grey, for the background.
 pub const GREY: Colour = Colour::hex(0x8a8a8a);
 /// Blue.
 pub const BLUE: Colour = Colour::hex(0x0072b2);
-/// Vermilion; what was injected.
+/// Vermilion, for injected values.
 pub const VERMILION: Colour = Colour::hex(0xd55e00);
 /// Green.
 pub const GREEN: Colour = Colour::hex(0x009e73);
@@ -42,13 +42,13 @@ pub const ORANGE: Colour = Colour::hex(0xe69f00);
 /// Light blue.
 pub const SKY: Colour = Colour::hex(0x56b4e9);
 
-/// Colours of series, in the order in which they are taken.
+/// Colours of series, in order.
 pub const SERIES: [Colour; 7] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK];
 
 /// A scale of colours for numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColourMap {
-    /// Dark blue to yellow, by Nunez et al. 2018: looks the same to the colour-blind.
+    /// Dark blue to yellow, by Nunez et al. 2018: the same with colour blindness.
     Cividis,
     /// Pale yellow to black: from photosphere to spot.
     Spots,

@@ -1,5 +1,5 @@
 //! Lines of equal value of a function on a rectangular grid, by marching squares: linear along the sides of a square,
-//! the value in its middle deciding where two lines could run either way.
+//! with saddles resolved by the value in the middle.
 
 use std::collections::HashMap;
 
@@ -15,7 +15,7 @@ struct Side {
 }
 
 /// The lines where `value(i, j)`, at node i of `x` and j of `y` (both rising), is `level`. Squares with a value that is
-/// not finite are left out.
+/// not finite are omitted.
 pub fn contour(x: &[f64], y: &[f64], value: impl Fn(usize, usize) -> f64, level: f64) -> Vec<Line> {
     let mut pieces = Vec::new();
     for j in 0..y.len().saturating_sub(1) {
@@ -50,7 +50,7 @@ fn square(value: &impl Fn(usize, usize) -> f64, level: f64, i: usize, j: usize, 
     match crossed[..] {
         [a, b] => pieces.push([sides[a], sides[b]]),
         [_, _, _, _] => {
-            // a saddle: the middle goes with the corners of its own kind, the other two are cut off
+            // a saddle: the middle is joined to the corners on its side of the level, the other two are cut off
             let middle = 0.25 * corners.iter().sum::<f64>() >= level;
             let pairs = if middle == above[0] { [[0, 1], [2, 3]] } else { [[3, 0], [1, 2]] };
             pieces.extend(pairs.map(|[a, b]| [sides[a], sides[b]]));
@@ -86,7 +86,7 @@ fn chains(pieces: &[[Side; 2]]) -> Vec<Vec<Side>> {
     chains
 }
 
-/// Goes on at the end of a chain for as long as there is a piece.
+/// Extends a chain at its end while there is a piece.
 fn extend(chain: &mut Vec<Side>, pieces: &[[Side; 2]], at: &HashMap<Side, Vec<usize>>, used: &mut [bool]) {
     while let Some(&k) = at[&chain[chain.len() - 1]].iter().find(|&&k| !used[k]) {
         used[k] = true;

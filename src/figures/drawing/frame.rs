@@ -1,4 +1,4 @@
-//! Frames of panels: ticks on all sides, numbers and labels below and to the left; and bars that explain colours.
+//! Frames of panels: ticks on all sides, numbers and labels below and to the left; and colour bars.
 
 use super::colour::BLACK;
 use super::panel::{Panel, Scale, Shade, Sides};
@@ -7,7 +7,7 @@ use super::{Align, Axis, Figure, Font, LABEL_PT, Paint, Rect, SMALL_PT, Segment,
 
 /// Length of a tick with a number (pt).
 const MAJOR: f64 = 3.0;
-/// Length of one without.
+/// Length of a tick without a number (pt).
 const MINOR: f64 = 1.6;
 /// The pen of frames.
 const PEN: Stroke = Stroke::new(BLACK, 0.6);
@@ -16,26 +16,26 @@ const GAP: f64 = 3.0;
 /// Height of a capital over its size.
 const CAPITAL: f64 = 0.71;
 
-/// How many numbers fit along a side.
+/// Number of labels that fit along a side.
 fn most(length: f64, apart: f64) -> usize {
     ((length / apart) as usize).clamp(2, 8)
 }
 
-/// Least distance of the ends of two numbers (pt).
+/// Smallest distance between the ends of two numbers (pt).
 const APART: f64 = 4.0;
 
-/// Where numbers may stand.
+/// The space for numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Room {
     /// At every tick.
     Free,
-    /// Within the panel's own width: other panels stand close by to its sides, whose numbers they would touch.
+    /// Within the width of the panel: adjacent panels to its sides have numbers there.
     OwnWidth,
-    /// Within its own width and height.
+    /// Within its width and height.
     Own,
 }
 
-/// Ticks along x; numbers that `room` has no place for are left out.
+/// Ticks along x; numbers without `room` are omitted.
 fn x_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
     let half = |text: &str| 0.5 * width_pt(text, SMALL_PT);
     let at = |value: f64| axis.share(value) * frame.width;
@@ -45,7 +45,7 @@ fn x_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
             found.with(|value, text| at(value) >= half(text) && at(value) + half(text) <= frame.width)
         }
     };
-    // numbers may not touch: fewer of them where they are long
+    // numbers must not touch: fewer of them where they are long
     let fits = |found: &Ticks| {
         let mut ends: Vec<[f64; 2]> =
             found.major.iter().map(|(value, text)| [at(*value) - half(text), at(*value) + half(text)]).collect();
@@ -67,7 +67,7 @@ fn y_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
         Room::Free | Room::OwnWidth => found,
         Room::Own => found.with(|value, _| at(value) >= half && at(value) + half <= frame.height),
     };
-    // one number alone gives no scale: closer together then, as long as there is room
+    // one number alone gives no scale: then at smaller distances, as long as there is room
     let closest = ((frame.height / 9.0) as usize).max(first);
     let tried = (first..=closest).map(|n| shown(ticks(axis.range, axis.scale, n))).find(|found| found.major.len() >= 3);
     tried.unwrap_or_else(|| shown(ticks(axis.range, axis.scale, first)))
@@ -79,18 +79,18 @@ impl Panel {
         draw(self, figure, sides, Room::Free);
     }
 
-    /// The same where other panels stand close by: no number leaves the panel's own width or height, so that those of
-    /// neighbours cannot touch.
+    /// The same with adjacent panels: no number leaves the width or height of the panel, so that those of neighbours
+    /// cannot touch.
     pub fn close_frame(&self, figure: &mut Figure, sides: Sides) {
         draw(self, figure, sides, Room::Own);
     }
 
-    /// The same where other panels stand close by to its sides alone.
+    /// The same with adjacent panels only to its sides.
     pub fn narrow_frame(&self, figure: &mut Figure, sides: Sides) {
         draw(self, figure, sides, Room::OwnWidth);
     }
 
-    /// The same with an axis of its own along the upper side; its numbers and label only if `labelled`.
+    /// The same with another axis along the upper side; its numbers and label only if `labelled`.
     pub fn two_axes_frame(&self, figure: &mut Figure, sides: Sides, upper: &Axis, labelled: bool) {
         let y = y_ticks(self.frame, &self.y, Room::OwnWidth);
         draw_with(self, figure, sides, &y, Room::OwnWidth, Some((upper, labelled)));
@@ -164,7 +164,7 @@ fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks, room: 
     }
 }
 
-/// Lengths of ticks, each with the values where they are.
+/// Lengths of ticks, each with the values of its ticks.
 fn lengths(ticks: &Ticks) -> [(f64, Vec<f64>); 2] {
     let major = ticks.major.iter().map(|(value, _)| *value).chain(ticks.silent.iter().copied());
     [(MAJOR, major.collect()), (MINOR, ticks.minor.clone())]
@@ -194,23 +194,23 @@ fn numbers_left(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
         let at = frame.bottom() - axis.share(*value) * frame.height + 0.5 * CAPITAL * SMALL_PT;
         figure.text(text, [frame.left - GAP, at], Font::SMALL, Align::Right, 0.0);
     }
-    // labels of panels above each other stand in one line: room for the numbers is the same everywhere
+    // labels of panels above each other are aligned: the space for the numbers is the same everywhere
     let at = [frame.left - LEFT_LABEL, frame.centre()[1]];
     figure.text(&axis.label, at, Font::LABEL, Align::Centre, 90.0);
 }
 
-/// Distance of the baseline of a label from the left side of its panel (pt): numbers of five characters have room.
+/// Distance of the baseline of a label from the left side of its panel (pt), with space for numbers of five characters.
 const LEFT_LABEL: f64 = 27.0;
 
 impl Shade {
-    /// A bar of the colours with ticks and a label, upright to the right of `beside`.
+    /// A vertical colour bar with ticks and a label, to the right of `beside`.
     pub fn upright_bar(&self, figure: &mut Figure, beside: Rect, label: &str) {
         let frame = Rect { left: beside.right() + 6.0, width: 6.0, ..beside };
         self.gradient(figure, frame, true);
         draw_right(figure, frame, &Axis::linear(label, [self.low, self.high]));
     }
 
-    /// The same, lying in `frame`, its ticks below; numbers rise to the right.
+    /// The same horizontally in `frame`, its ticks below; numbers rise to the right.
     pub fn lying_bar(&self, figure: &mut Figure, frame: Rect, label: &str) {
         self.gradient(figure, frame, false);
         draw_below(figure, frame, &Axis::linear(label, [self.low.min(self.high), self.low.max(self.high)]));

@@ -1,9 +1,9 @@
-//! Legends: a sample and a text a line, in a corner of a panel or in a row above it.
+//! Legends: one sample and text per line, in a corner of a panel or in a row above it.
 
 use super::colour::WHITE;
 use super::{Align, Colour, Figure, Font, Marker, Paint, Point, Rect, SMALL_PT, Stroke, width_pt};
 
-/// What a line of a legend shows beside its text.
+/// The sample in a line of a legend.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Key {
     /// A line.
@@ -30,7 +30,7 @@ const LINE: f64 = 9.5;
 const PAD: f64 = 3.5;
 
 impl Legend {
-    /// Adds a line; none if the text is empty.
+    /// Adds a line, unless the text is empty.
     pub fn add(&mut self, key: Key, text: &str) {
         if !text.is_empty() {
             self.entries.push((key, text.into()));
@@ -42,12 +42,12 @@ impl Legend {
         self.entries.is_empty()
     }
 
-    /// Where it goes in a corner of `frame`: 0, 0.5 or 1 from the left and from above.
+    /// Its rectangle in a corner of `frame`: 0, 0.5 or 1 from the left and from above.
     fn place(&self, frame: Rect, corner: Point) -> Rect {
         let widest = self.entries.iter().map(|(_, text)| width_pt(text, SMALL_PT)).fold(0.0, f64::max);
         let width = SAMPLE + widest + 3.0 * PAD;
         let height = LINE * self.entries.len() as f64 + PAD;
-        // clear of the ticks
+        // away from the ticks
         let margin = 5.0;
         let left = frame.left + margin + corner[0] * (frame.width - width - 2.0 * margin);
         let top = frame.top + margin + corner[1] * (frame.height - height - 2.0 * margin);

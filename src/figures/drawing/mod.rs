@@ -1,12 +1,13 @@
 //! Figures for papers: one description, two files. A [`Figure`] is a list of shapes and texts on a page; it is written
-//! as SVG ([`Figure::svg`]) and as PNG ([`Figure::png`]) alike, the same bytes every time.
+//! as SVG ([`Figure::svg`]) and as PNG ([`Figure::png`]), the same bytes every time.
 //!
 //! On top of it: a [`Panel`] with axes turns data into shapes, [`scatter()`] makes whole figures of tables (points with
-//! error bars, lines, a reference line), [`contour`] follows levels. Colours survive colour blindness and grey print,
-//! the font comes with the program, and a figure is as wide as a column ([`COLUMN_MM`]) or a page ([`PAGE_MM`]) of a
-//! journal. Lengths on the page are points (1/72 inch) from its upper left corner.
+//! error bars, lines, a reference line), [`contour`] computes contours. Colours remain distinguishable with colour
+//! blindness and in grey print, the font is included in the program, and a figure has the width of a column
+//! ([`COLUMN_MM`]) or a page ([`PAGE_MM`]) of a journal. Lengths on the page are points (1/72 inch) from its upper left
+//! corner.
 //!
-//! Recovered against injected K, with error bars and the line where they agree:
+//! Recovered compared with injected K, with error bars and the line of equality:
 //!
 //! ```
 //! use dimcmc::internals::figures::drawing::{Errors, Reference, ScatterPanel, Series, scatter};
@@ -63,7 +64,7 @@ pub const SMALL_PT: f64 = 7.0;
 /// Points in a millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
 
-/// A place on the page (pt from the left and from the top).
+/// A position on the page (pt from the left and from the top).
 pub type Point = [f64; 2];
 
 /// A rectangle on the page (pt).
@@ -96,7 +97,7 @@ impl Rect {
     }
 }
 
-/// A piece of a path.
+/// A segment of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segment {
     /// Begins a new line.
@@ -107,7 +108,7 @@ pub enum Segment {
     Quad(Point, Point),
     /// A cubic Bezier curve by its two control points.
     Cubic(Point, Point, Point),
-    /// Back to the last beginning.
+    /// Back to the beginning of the line.
     Close,
 }
 
@@ -139,14 +140,14 @@ impl Stroke {
     }
 }
 
-/// What a path is drawn with.
+/// Fill and outline of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Paint {
     /// Colour of its inside.
     pub fill: Option<Colour>,
     /// Pen of its outline.
     pub stroke: Option<Stroke>,
-    /// Without smoothed edges, for areas that touch or overlap each other. Elsewhere an area within an area is a hole.
+    /// Without anti-aliasing, for areas that touch or overlap each other. Elsewhere an area within an area is a hole.
     pub sharp: bool,
 }
 
@@ -167,10 +168,10 @@ impl Paint {
     }
 }
 
-/// What stands on the page.
+/// An item of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Item {
-    /// A shape. `class` says what it stands for, `clip` is the number of the path outside of which nothing is drawn.
+    /// A shape. `class` is its meaning, `clip` the index of the clipping path.
     Path { class: &'static str, segments: Vec<Segment>, paint: Paint, clip: Option<usize> },
     /// A text with its glyphs.
     Text { text: String, glyphs: Vec<text::Glyph>, colour: Colour },
@@ -179,11 +180,11 @@ pub(crate) enum Item {
 /// A figure: shapes and texts on a page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Its name, that of its files.
+    /// Its name, also that of its files.
     pub name: String,
-    /// What it shows, in a sentence or two.
+    /// Its content, in a sentence or two.
     pub caption: String,
-    /// What is missing in it, a line each.
+    /// Its limitations, one line each.
     pub notes: Vec<String>,
     /// Width of the page (pt).
     pub width: f64,
@@ -209,7 +210,7 @@ impl Figure {
         }
     }
 
-    /// Draws a path; `class` says what it stands for, in the SVG.
+    /// Draws a path; `class` is its meaning, for the SVG.
     pub fn path(&mut self, class: &'static str, segments: Vec<Segment>, paint: Paint) {
         if !segments.is_empty() {
             self.items.push(Item::Path { class, segments, paint, clip: self.clip });
@@ -243,7 +244,7 @@ impl Figure {
         self.items.push(Item::Text { text: plain(text), glyphs, colour: font.colour });
     }
 
-    /// Draws what `draw` draws, but nothing outside of `outline`.
+    /// Clips the result of `draw` to `outline`.
     pub fn clipped(&mut self, outline: Vec<Segment>, draw: impl FnOnce(&mut Figure)) {
         let before = self.clip.replace(self.clips.len());
         self.clips.push(outline);
@@ -256,7 +257,7 @@ impl Figure {
         svg::write(self)
     }
 
-    /// The figure as PNG with so many pixels to the inch.
+    /// The figure as PNG with so many pixels per inch.
     pub fn png(&self, dpi: f64) -> Vec<u8> {
         png::write(self, dpi)
     }
@@ -284,7 +285,7 @@ pub fn rectangle(rect: Rect) -> Vec<Segment> {
 
 /// The outline of an ellipse, of four cubic curves.
 pub fn ellipse([x, y]: Point, [a, b]: [f64; 2]) -> Vec<Segment> {
-    // control points that bring the curves to within 3e-4 of the radius
+    // control points for which the curves are within 3e-4 of the radius
     const C: f64 = 0.552_284_75;
     let at = |u: f64, v: f64| [x + a * u, y + b * v];
     vec![

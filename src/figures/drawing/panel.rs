@@ -1,27 +1,27 @@
-//! A panel: a rectangle of the page with two axes, and data drawn in it. Nothing that is drawn by its axes leaves it.
+//! A panel: a rectangle of the page with two axes, and data drawn in it. Shapes drawn by its axes are clipped to it.
 
 use super::colour::{BLACK, Colour, ColourMap, WHITE};
 use super::{Figure, Paint, Point, Rect, Segment, Stroke, closed, open, rectangle, smooth};
 use std::collections::BTreeMap;
 
-/// How values become lengths.
+/// The map from values to lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// In proportion.
+    /// Linear.
     #[default]
     Linear,
-    /// By their logarithms; all values must be above 0.
+    /// Logarithmic; all values must be above 0.
     Log,
 }
 
-/// One axis: what it shows, from where to where.
+/// One axis: its quantity and range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// What it shows, with its unit, in the markup of [`Figure::text`].
+    /// Its quantity, with its unit, in the markup of [`Figure::text`].
     pub label: String,
     /// Values at its ends; the first may be the larger one.
     pub range: [f64; 2],
-    /// How values become lengths.
+    /// The map from values to lengths.
     pub scale: Scale,
 }
 
@@ -36,7 +36,7 @@ impl Axis {
         Axis { label: label.into(), range, scale: Scale::Log }
     }
 
-    /// Where a value is: 0 at the first end, 1 at the second.
+    /// The position of a value: 0 at the first end, 1 at the second.
     pub fn share(&self, value: f64) -> f64 {
         let [first, last] = self.range;
         match self.scale {
@@ -45,7 +45,7 @@ impl Axis {
         }
     }
 
-    /// The value at a share of the way from the first end to the second.
+    /// The value at a fraction of the distance from the first end to the second.
     pub fn value(&self, share: f64) -> f64 {
         let [first, last] = self.range;
         match self.scale {
@@ -75,11 +75,11 @@ pub enum Marker {
 }
 
 impl Marker {
-    /// Shapes of series, in the order in which they are taken.
+    /// Shapes of series, in order.
     pub const SERIES: [Marker; 7] =
         [Marker::Disc, Marker::Square, Marker::Triangle, Marker::Diamond, Marker::Ring, Marker::Cross, Marker::Plus];
 
-    /// Draws it at a place of the page, `size` points wide.
+    /// Draws it at a position of the page, `size` points wide.
     pub fn draw(self, figure: &mut Figure, class: &'static str, at: Point, size: f64, colour: Colour) {
         let r = 0.5 * size;
         let corner = |x: f64, y: f64| [at[0] + r * x, at[1] + r * y];
@@ -115,15 +115,15 @@ impl Marker {
 /// A rectangle of the page with axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
-    /// Where it is.
+    /// Its rectangle.
     pub frame: Rect,
-    /// To the right.
+    /// The horizontal axis.
     pub x: Axis,
-    /// Upwards.
+    /// The vertical axis.
     pub y: Axis,
 }
 
-/// What is drawn of ticks, numbers and labels, side by side.
+/// The sides with ticks, numbers and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sides {
     /// Numbers and label below the panel.
@@ -138,13 +138,13 @@ impl Sides {
 }
 
 impl Panel {
-    /// Where a pair of values is on the page.
+    /// The position of a pair of values on the page.
     pub fn place(&self, x: f64, y: f64) -> Point {
         let Rect { left, width, height, .. } = self.frame;
         [left + self.x.share(x) * width, self.frame.bottom() - self.y.share(y) * height]
     }
 
-    /// Draws what `draw` draws, but nothing outside of the panel.
+    /// Clips the result of `draw` to the panel.
     pub fn clipped(&self, figure: &mut Figure, draw: impl FnOnce(&mut Figure)) {
         figure.clipped(rectangle(self.frame), draw);
     }
@@ -156,8 +156,8 @@ impl Panel {
         self.clipped(figure, |figure| figure.path(class, path, Paint::stroke(stroke)));
     }
 
-    /// A smooth line through points in the order of their x, which rises and falls only where they do; it breaks
-    /// where a value is not finite.
+    /// A smooth line through points in the order of their x, with extrema only at points; it breaks where a value is
+    /// not finite.
     pub fn smooth_line(&self, figure: &mut Figure, class: &'static str, points: &[[f64; 2]], stroke: Stroke) {
         let places = self.places(points);
         let pieces = places.split(|p| !(p[0].is_finite() && p[1].is_finite()));
@@ -207,7 +207,7 @@ impl Panel {
         self.line(figure, class, &[[self.x.range[0], y], [self.x.range[1], y]], stroke);
     }
 
-    /// Tiles from x0 to x1 and y0 to y1 in the colours of numbers; what is not finite stays as it is.
+    /// Tiles from x0 to x1 and y0 to y1 in the colours of their values; values that are not finite are not painted.
     pub fn tiles(&self, figure: &mut Figure, tiles: impl Iterator<Item = Tile>, shade: Shade) {
         let mut of_colour: BTreeMap<[u8; 4], Vec<Segment>> = BTreeMap::new();
         for Tile { x: [x0, x1], y: [y0, y1], value } in tiles {
@@ -223,7 +223,7 @@ impl Panel {
         });
     }
 
-    /// A text within the panel, at shares of its width (from the left) and height (from above).
+    /// A text within the panel, at fractions of its width (from the left) and height (from above).
     pub fn note(&self, figure: &mut Figure, text: &str, at: Point, align: super::Align) {
         let place = [self.frame.left + at[0] * self.frame.width, self.frame.top + at[1] * self.frame.height];
         figure.text(text, place, super::Font::SMALL.coloured(BLACK), align, 0.0);
@@ -234,30 +234,30 @@ impl Panel {
     }
 }
 
-/// A rectangle with a number.
+/// A rectangle with a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tile {
-    /// From where to where along x.
+    /// Range along x.
     pub x: [f64; 2],
     /// The same along y.
     pub y: [f64; 2],
-    /// The number.
+    /// The value.
     pub value: f64,
 }
 
-/// Colours of numbers.
+/// The colour scale of values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shade {
     /// The colours.
     pub map: ColourMap,
-    /// The number of the first.
+    /// The value of the first colour.
     pub low: f64,
-    /// The number of the last.
+    /// The value of the last colour.
     pub high: f64,
 }
 
 impl Shade {
-    /// The colour of a number; `None` if it is not finite.
+    /// The colour of a value; `None` if it is not finite.
     pub fn colour(&self, value: f64) -> Option<Colour> {
         value.is_finite().then(|| self.map.at((value - self.low) / (self.high - self.low)))
     }

@@ -1,4 +1,4 @@
-//! A figure as PNG: opaque, on white, by the same shapes as the SVG.
+//! A figure as PNG: opaque, on white, with the same shapes as the SVG.
 
 use super::text;
 use super::{Colour, Figure, Item, Paint, Point, Segment};
@@ -52,7 +52,7 @@ fn mask(width: u32, height: u32, clip: &[Segment], to_page: Transform) -> Mask {
     mask
 }
 
-/// Draws a path; holes of areas go by `rule`.
+/// Draws a path; `rule` decides on holes of areas.
 fn draw(
     page: &mut Pixmap,
     segments: &[Segment],
@@ -83,7 +83,7 @@ fn pen(Colour([r, g, b, a]): Colour, sharp: bool) -> tiny_skia::Paint<'static> {
     pen
 }
 
-/// The path in the rasteriser's words; `None` for one without extent.
+/// The path in the rasteriser's format; `None` for one without extent.
 fn path(segments: &[Segment]) -> Option<tiny_skia::Path> {
     let mut builder = PathBuilder::new();
     let f = |[x, y]: Point| (x as f32, y as f32);

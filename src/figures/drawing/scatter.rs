@@ -13,7 +13,7 @@ pub enum Errors {
     /// None.
     #[default]
     None,
-    /// As long to either side, one for each point.
+    /// The same length to either side, one for each point.
     Symmetric(Vec<f64>),
     /// Lengths downwards and upwards, one pair for each point.
     Asymmetric(Vec<[f64; 2]>),
@@ -31,14 +31,14 @@ impl Errors {
     }
 }
 
-/// Points that belong together.
+/// A series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// Its text in the legend; none if empty.
+    /// Its text in the legend; empty for none.
     pub label: String,
-    /// To the right.
+    /// Horizontal positions.
     pub x: Vec<f64>,
-    /// Upwards; as many as `x`. A point that is not finite is left out.
+    /// Vertical positions; as many as `x`. A point that is not finite is omitted.
     pub y: Vec<f64>,
     /// Error bars along x.
     pub x_errors: Errors,
@@ -46,30 +46,30 @@ pub struct Series {
     pub y_errors: Errors,
     /// Whether points are joined by a line.
     pub joined: bool,
-    /// Whether there are only the line and the error bars, and no points.
+    /// Whether only the line and the error bars are drawn, without points.
     pub bare: bool,
 }
 
-/// A line to hold the points against.
+/// A reference line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reference {
     /// y = x.
     Diagonal {
-        /// Its text in the legend; none if empty.
+        /// Its text in the legend; empty for none.
         label: String,
     },
-    /// Across the panel.
+    /// A horizontal line.
     Horizontal {
-        /// Where.
+        /// Its position.
         at: f64,
-        /// Its text in the legend; none if empty.
+        /// Its text in the legend; empty for none.
         label: String,
     },
-    /// Up the panel.
+    /// A vertical line.
     Vertical {
-        /// Where.
+        /// Its position.
         at: f64,
-        /// Its text in the legend; none if empty.
+        /// Its text in the legend; empty for none.
         label: String,
     },
 }
@@ -77,13 +77,13 @@ pub enum Reference {
 /// A panel of such a figure.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScatterPanel {
-    /// Above the panel; none if empty.
+    /// Title above the panel; empty for none.
     pub title: String,
-    /// What x is, with its unit, in the markup of [`Figure::text`].
+    /// The quantity x, with its unit, in the markup of [`Figure::text`].
     pub x_label: String,
-    /// What y is.
+    /// The quantity y.
     pub y_label: String,
-    /// From where to where along x; what holds all points and bars if not given.
+    /// Range along x; by default that of all points and bars.
     pub x_range: Option<[f64; 2]>,
     /// The same along y.
     pub y_range: Option<[f64; 2]>,
@@ -91,20 +91,19 @@ pub struct ScatterPanel {
     pub x_scale: Scale,
     /// Scale along y.
     pub y_scale: Scale,
-    /// The points; colour and shape go by the place in the list.
+    /// The series; colour and shape follow from the index.
     pub series: Vec<Series>,
-    /// Lines to hold them against.
+    /// Reference lines.
     pub references: Vec<Reference>,
-    /// Where the legend is: 0, 0.5 or 1 from the left and from above; where it covers the fewest points if not
-    /// given.
+    /// Position of the legend: 0, 0.5 or 1 from the left and from above; by default where it covers the fewest points.
     pub legend_at: Option<[f64; 2]>,
 }
 
 /// Margins of a panel: left, right, above, below (pt).
 const MARGINS: [f64; 4] = [38.0, 8.0, 16.0, 26.0];
 
-/// A figure of such panels, in rows of `columns`: a column of a journal wide if that is 1, a page wide otherwise. A
-/// legend that the first of several panels has for all stands above them.
+/// A figure of such panels, in rows of `columns`: as wide as a column of a journal if that is 1, otherwise as a page. A
+/// legend in the first of several panels that applies to all is placed above them.
 pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
     let columns = columns.max(1);
     let rows = panels.len().div_ceil(columns).max(1);
@@ -248,13 +247,13 @@ fn draw_series(figure: &mut Figure, panel: &Panel, series: &Series, k: usize, le
     if !series.bare {
         panel.points(figure, "point", &points, (marker, 4.5, colour));
     }
-    // what has no point to show is not explained
+    // a series without points needs no legend
     if series.has_points() {
         legend.add(key(series, k), &series.label);
     }
 }
 
-/// What the legend shows of series `k`.
+/// The sample of series `k` in the legend.
 fn key(series: &Series, k: usize) -> Key {
     let colour = SERIES[k % SERIES.len()];
     let marker = Marker::SERIES[k % Marker::SERIES.len()];

@@ -1,12 +1,12 @@
-//! A smooth curve through points: cubic pieces whose slopes are chosen so that it rises and falls only where the
-//! points do, with its maxima and minima on them (Fritsch & Butland 1984).
+//! A smooth curve through points: cubic segments whose slopes are chosen so that it is monotonic between points, with
+//! its extrema at points (Fritsch & Butland 1984).
 
 use super::{Point, Segment};
 
-/// Nearer points than this (pt) are joined by straight lines: nobody sees the difference.
+/// Points closer than this (pt) are joined by straight lines: the difference is invisible.
 const CLOSE: f64 = 0.5;
 
-/// The path through `points`, whose x rises or falls all the way.
+/// The path through `points`, whose x is monotonic.
 pub(super) fn curve(points: &[Point]) -> Vec<Segment> {
     let Some(first) = points.first() else { return Vec::new() };
     let slopes = slopes(points);
@@ -25,7 +25,7 @@ pub(super) fn curve(points: &[Point]) -> Vec<Segment> {
     path
 }
 
-/// Slopes at the points: level at an extremum, elsewhere a weighted harmonic mean of those to either side.
+/// Slopes at the points: zero at an extremum, elsewhere a weighted harmonic mean of those to either side.
 fn slopes(points: &[Point]) -> Vec<f64> {
     let width: Vec<f64> = points.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
     let secant: Vec<f64> =
@@ -36,7 +36,7 @@ fn slopes(points: &[Point]) -> Vec<f64> {
             let (a, b) = (2.0 * width[k] + width[k - 1], width[k] + 2.0 * width[k - 1]);
             (a + b) / (a / before + b / after)
         }
-        // an end goes straight on
+        // an end continues straight
         (None, Some(&one)) | (Some(one), None) if one.is_finite() => one,
         _ => 0.0,
     };

@@ -1,4 +1,5 @@
-//! A figure as SVG 1.1. Glyphs are defined once and used; every text has its content as a label beside its outlines.
+//! A figure as SVG 1.1. Glyphs are defined once and referenced; every text has its content as a label with its
+//! outlines.
 
 use super::text::{self, Shape};
 use super::{Colour, Figure, Item, PT_PER_MM, Paint, Point, Segment};
@@ -63,7 +64,7 @@ fn shapes(figure: &Figure) -> BTreeSet<Shape> {
     glyphs.map(|glyph| glyph.shape).collect()
 }
 
-/// The same glyph has another name in every figure, so that a page may hold several.
+/// The same glyph has a different name in every figure, so that a page may contain several figures.
 fn glyph_id(name: &str, shape: Shape) -> String {
     format!("{name}-{}{}", if shape.italic { 'i' } else { 'r' }, shape.id)
 }
@@ -105,7 +106,7 @@ fn css(Colour([r, g, b, a]): Colour) -> (String, Option<String>) {
 
 fn path(segments: &[Segment]) -> String {
     let mut text = String::new();
-    // where the pen is, as it was written
+    // the position of the pen, as written
     let mut pen = [String::new(), String::new()];
     for segment in segments {
         let (letter, points): (char, &[Point]) = match segment {
@@ -133,14 +134,14 @@ fn path(segments: &[Segment]) -> String {
     text
 }
 
-/// A number to a hundredth, without idle zeros.
+/// A number to a hundredth, without trailing zeros.
 fn number(x: f64) -> String {
     let text = format!("{x:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// For an attribute or an element; control characters, which XML does not know, are written as escapes.
+/// Escapes text for an attribute or an element, and control characters, which XML does not allow.
 fn escape(text: &str) -> String {
     let shown = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
     let text: String = text.chars().map(shown).collect();

@@ -1,5 +1,5 @@
-//! Text as outlines of glyphs, so that a figure looks the same wherever it is shown: Open Sans, which comes with the
-//! program (Apache 2.0; reduced to Latin, Greek and some mathematics).
+//! Text as outlines of glyphs, so that a figure looks the same everywhere: Open Sans, which is included in the program
+//! (Apache 2.0; reduced to Latin, Greek and some mathematics).
 //!
 //! Markup: `*italic*`, `_{subscript}`, `^{superscript}`.
 
@@ -18,9 +18,9 @@ pub struct Font {
 }
 
 impl Font {
-    /// That of axis labels.
+    /// The font of axis labels.
     pub const LABEL: Font = Font { size: LABEL_PT, colour: BLACK };
-    /// That of the numbers at ticks, and of legends.
+    /// The font of the numbers at ticks, and of legends.
     pub const SMALL: Font = Font { size: SMALL_PT, colour: BLACK };
 
     /// The same in another colour.
@@ -29,7 +29,7 @@ impl Font {
     }
 }
 
-/// Where a text stands with respect to its place.
+/// Position of a text relative to its reference point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     /// It begins there.
@@ -46,13 +46,13 @@ const SCRIPT: f64 = 0.7;
 /// A glyph on the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Glyph {
-    /// Which one.
+    /// The shape.
     pub shape: Shape,
-    /// Where its origin is.
+    /// Position of its origin.
     pub at: Point,
-    /// Points to a font unit.
+    /// Points per font unit.
     pub scale: f64,
-    /// How far it is turned (degrees, anticlockwise).
+    /// Its rotation (degrees, anticlockwise).
     pub turn: f64,
 }
 
@@ -73,13 +73,13 @@ fn face(italic: bool) -> &'static Face<'static> {
     &FACES[usize::from(italic)]
 }
 
-/// A character with the style that the markup gives it.
+/// A character with its style from the markup.
 struct Styled {
     character: char,
     italic: bool,
     /// Size over that of the text.
     size: f64,
-    /// Height of its baseline over that of the text, in sizes of the text.
+    /// Height of its baseline above that of the text, in sizes of the text.
     rise: f64,
 }
 

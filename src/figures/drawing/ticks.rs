@@ -1,20 +1,20 @@
-//! Where ticks are and what stands at them: steps of 1, 2 or 5 times a power of ten, or decades.
+//! Positions and labels of ticks: steps of 1, 2 or 5 times a power of ten, or decades.
 
 use super::Scale;
 
 /// Ticks of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Ticks {
-    /// Values with the text at them.
+    /// Values with their labels.
     pub major: Vec<(f64, String)>,
-    /// Such values without a text, for which there is no room.
+    /// Values without a label, for lack of space.
     pub silent: Vec<f64>,
     /// Values between them.
     pub minor: Vec<f64>,
 }
 
 impl Ticks {
-    /// The same with the texts that `has_room` alone.
+    /// The same with only those labels that have space according to `has_room`.
     pub fn with(self, has_room: impl Fn(f64, &str) -> bool) -> Self {
         let (major, left): (Vec<_>, Vec<_>) = self.major.into_iter().partition(|(value, text)| has_room(*value, text));
         let silent = self.silent.into_iter().chain(left.into_iter().map(|(value, _)| value)).collect();
@@ -50,7 +50,7 @@ fn linear(low: f64, high: f64, most: usize) -> Ticks {
     let (step, power) = step(high - low, most);
     let decimals = (-power).max(0) as usize;
     let within = |step: f64| {
-        // a rounding error may not cost the tick at an end
+        // a rounding error must not remove the tick at an end
         let slack = 1e-9 * (high - low);
         let (first, last) = (((low - slack) / step).ceil() as i64, ((high + slack) / step).floor() as i64);
         (first..=last).map(move |k| (k, k as f64 * step))
@@ -70,7 +70,7 @@ fn linear(low: f64, high: f64, most: usize) -> Ticks {
 }
 
 fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
-    // no decades without end
+    // avoids an infinite number of decades
     if !(low > 0.0 && high.is_finite()) {
         return Ticks::default();
     }
@@ -83,7 +83,7 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     const DENSITIES: [&[f64]; 4] = [&[1.0, 2.0, 3.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
     let factors = DENSITIES.into_iter().find(|factors| multiples(factors).count() <= most).unwrap_or(&[1.0]);
     let major: Vec<f64> = multiples(factors).collect();
-    // within less than a decade there may be hardly any of these: round numbers at equal steps then
+    // within less than a decade there may be hardly any of these: then round numbers at equal steps
     if major.len() < 2 && high > low && high < 10.0 * low {
         return linear(low, high, most);
     }
@@ -103,8 +103,8 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     Ticks { major: major.into_iter().map(|value| (value, text(value))).collect(), silent: Vec::new(), minor }
 }
 
-/// A range that holds all finite `values` with a margin of `share` of their extent to either side; of positive values
-/// only for a logarithmic scale, where the margin is of the logarithm.
+/// A range that contains all finite `values` with a margin of `share` of their extent to either side; for a logarithmic
+/// scale of positive values only, with the margin in the logarithm.
 pub fn range_of(values: impl Iterator<Item = f64>, scale: Scale, share: f64) -> [f64; 2] {
     let log = scale == Scale::Log;
     let values = values.filter(|x| x.is_finite() && (!log || *x > 0.0)).map(|x| if log { x.ln() } else { x });
@@ -116,7 +116,7 @@ pub fn range_of(values: impl Iterator<Item = f64>, scale: Scale, share: f64) -> 
             let margin = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
             [low - margin, high + margin]
         }
-        // not one value
+        // no values
         _ => [0.0, 1.0],
     };
     if log { [low.exp(), high.exp()] } else { [low, high] }

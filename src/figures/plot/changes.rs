@@ -1,5 +1,4 @@
-//! Where the star changed: what a star that does not change leaves over in the profiles, in the order of their time,
-//! and what one that changes does.
+//! Spot evolution: residuals of a static map in the profiles, in the order of their time, and those of an evolving map.
 
 use super::dynamic::edges;
 use super::profiles::{Line, extent};
@@ -8,20 +7,20 @@ use crate::figures::drawing::colour::{BLACK, ColourMap, GREY};
 use crate::figures::drawing::panel::{Shade, Tile};
 use crate::figures::drawing::{Align, Axis, Figure, Font, PAGE_MM, Paint, Panel, Point, Rect, Stroke, open, width_pt};
 
-/// Profiles further apart than this (d) are of different nights.
+/// Profiles further apart than this (d) belong to different nights.
 const NIGHT_GAP_D: f64 = 0.5;
 
-/// Least and most of the scale of colours (standard errors).
+/// Smallest and largest range of the colour scale (standard errors).
 const REACH: [f64; 2] = [4.0, 20.0];
 
-/// Height of a profile (pt), and of all of them at most.
+/// Height of a profile (pt), and largest total height.
 const ROW: f64 = 5.0;
 const HIGHEST: f64 = 560.0;
 
-/// Times are written this far apart (pt) at least.
+/// Smallest distance of time labels (pt).
 const LABELS: f64 = 8.0;
 
-/// The figure of profiles with both models; `None` where there is one alone.
+/// The figure of profiles with both models; `None` where there is only one.
 pub(super) fn figure(lines: &[Line]) -> Option<Figure> {
     if lines.iter().any(|line| line.unchanging.is_empty()) {
         return None;
@@ -77,7 +76,7 @@ pub(super) fn figure(lines: &[Line]) -> Option<Figure> {
 /// Rows between seasons.
 const BETWEEN_SEASONS: f64 = 3.0;
 
-/// The row of each profile, by its time (d): one after the other, and some are left out between seasons.
+/// The row of each profile, by its time (d): consecutive, with a gap between seasons.
 fn places(times_d: &[f64]) -> Vec<f64> {
     let parts = stretches(times_d.iter().copied(), 0.0, 1.0);
     let season = |time: f64| parts.iter().position(|part| part.holds(time)).unwrap_or(0);
@@ -88,7 +87,7 @@ fn time(line: &Line) -> String {
     format!("{:.2}", line.time_d)
 }
 
-/// What hardly any of these numbers exceeds, within [`REACH`].
+/// A value that very few of these numbers exceed, within [`REACH`].
 fn reach(numbers: impl Iterator<Item = f64>) -> f64 {
     let mut numbers: Vec<f64> = numbers.filter(|x| x.is_finite()).collect();
     numbers.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! A chain against a landscape: the estimates of each parameter below each other.
+//! A chain compared with a likelihood grid: the estimates of each parameter below each other.
 
 use super::PlotError;
 use super::symbols::{label, nearest_turn};
@@ -10,7 +10,7 @@ use crate::runs::comparison::{Compared, Comparison, FILE, Interval};
 use crate::runs::origin;
 use std::path::Path;
 
-/// One line of a panel: what, value, interval, and how it is drawn.
+/// One line of a panel: name, value, interval, and its style.
 type Entry = (&'static str, f64, Option<[f64; 2]>, Marker, Colour);
 
 /// The figure.

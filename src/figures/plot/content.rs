@@ -1,4 +1,4 @@
-//! What a map of the star shows, and what that means for its colours, discs and words.
+//! The quantity in a map of the star, and its colours, discs and words.
 
 use super::injected::Injected;
 use super::surface::Scale;
@@ -6,7 +6,7 @@ use crate::figures::drawing::colour::ColourMap;
 use crate::figures::drawing::panel::Shade;
 use crate::star::{Brightness, Disc};
 
-/// What a map shows.
+/// The quantity in a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
     /// Spot filling factors.
@@ -26,8 +26,8 @@ impl Content {
         )
     }
 
-    /// Discs with what the map holds inside them, those that cover others last: of spots the fuller ones, of faculae
-    /// the brighter ones, and spots whatever faculae they cover.
+    /// Discs with the map's value inside them, those that cover others last: spots with larger filling, brighter
+    /// faculae, and spots over any faculae that they cover.
     pub fn discs(self, injected: &Injected) -> Vec<(Disc, f64)> {
         let mut spots: Vec<(Disc, f64)> = injected.spots.iter().map(|spot| (spot.disc(), spot.filling)).collect();
         spots.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -38,11 +38,11 @@ impl Content {
         discs
     }
 
-    /// Colours for all that is to be painted.
+    /// Colours for all painted values.
     pub fn scale(self, values: impl Iterator<Item = f64>) -> Scale {
         let photosphere = if self == Content::Spots { 0.0 } else { 1.0 };
         let highest = values.map(|value| (value - photosphere).abs()).fold(0.0, f64::max);
-        // a map of faint spots has a scale of its own
+        // a map of faint spots has a smaller scale
         let reach = if highest > 0.5 { 1.0 } else { ((10.0 * highest).ceil() / 10.0).max(0.1) };
         let shade = match self {
             Content::Spots => Shade { map: ColourMap::Spots, low: 0.0, high: reach },

@@ -1,6 +1,6 @@
-//! Corner plots: every parameter by itself and against every other. Of a chain: histograms, and contours of 68 and 95 %
-//! of the draws; a periodic parameter is unwrapped around its mode, and one with a log-uniform prior has a logarithmic
-//! axis.
+//! Corner plots: the marginal of every parameter and of every pair. For a chain: histograms, and contours of 68 and 95
+//! % of the draws; a periodic parameter is unwrapped around its mode, and one with a log-uniform prior has a
+//! logarithmic axis.
 
 use super::density::Density;
 use super::symbols::{Shown, Title};
@@ -15,13 +15,13 @@ use crate::figures::drawing::{
 /// A triangle of panels.
 pub(super) struct Corner<'a> {
     pub shown: &'a [Shown],
-    /// From where to where each parameter is shown.
+    /// The plotted range of each parameter.
     pub ranges: Vec<[f64; 2]>,
-    /// How its values become lengths.
+    /// The scale of its axis.
     pub scales: Vec<Scale>,
     /// Injected values.
     pub truth: Vec<Option<f64>>,
-    /// What stands above each histogram.
+    /// Titles above the histograms.
     pub titles: Vec<Title>,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Corner<'a> {
 const MARGIN: [f64; 2] = [40.0, 32.0];
 
 impl Corner<'_> {
-    /// Draws all panels; `diagonal` and `pair` draw what is in them, before frames and injected values.
+    /// Draws all panels; `diagonal` and `pair` draw their content, before frames and injected values.
     pub fn draw(
         &self,
         name: &str,
@@ -113,14 +113,14 @@ fn widest(lines: &[String]) -> f64 {
     lines.iter().map(|line| width_pt(line, Font::SMALL.size)).fold(0.0, f64::max)
 }
 
-/// All titles in as few lines as panels that wide have room for.
+/// All titles in as few lines as fit into panels of that width.
 fn titles(titles: &[Title], width: f64) -> Vec<Vec<String>> {
     let all = |lines: usize| titles.iter().map(|title| title.lines(lines)).collect::<Vec<_>>();
     let fits = |titles: &Vec<Vec<String>>| titles.iter().all(|lines| widest(lines) <= width);
     (1..Title::LINES).map(all).find(fits).unwrap_or_else(|| all(Title::LINES))
 }
 
-/// Writes a title above a panel, in smaller letters where it would be wider.
+/// Writes a title above a panel, in a smaller font where it would be wider.
 fn write_title(figure: &mut Figure, frame: Rect, lines: &[String]) {
     let size = Font::SMALL.size * (frame.width / widest(lines).max(1.0)).min(1.0);
     for (k, line) in lines.iter().enumerate() {
@@ -129,7 +129,7 @@ fn write_title(figure: &mut Figure, frame: Rect, lines: &[String]) {
     }
 }
 
-/// Shares of the draws that contours hold.
+/// Fractions of the draws within contours.
 pub(super) const SHARES: [f64; 2] = [0.95, 0.68];
 
 /// Colours of the areas, in the order of [`SHARES`].
@@ -175,7 +175,7 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
         histogram(figure, frame, x, &draws[i], (!one.unconstrained).then_some(ci68));
     };
     let pair = |figure: &mut Figure, panel: &Panel, i: usize, j: usize| {
-        // a share of the panel is what a density on a logarithmic axis is by
+        // the density on a logarithmic axis is per fraction of the panel
         let both: Vec<[f64; 2]> =
             draws[i].iter().zip(&draws[j]).map(|(x, y)| [panel.x.share(*x), panel.y.share(*y)]).collect();
         contours(figure, panel, Density::of(&both, sampled.effective(), [[0.0, 1.0]; 2]).as_ref());
@@ -217,7 +217,7 @@ fn histogram(figure: &mut Figure, frame: Rect, x: Axis, draws: &[f64], ci68: Opt
     panel.line(figure, "histogram", &steps, Stroke::new(BLACK, 0.6));
 }
 
-/// Contours of a density over shares of the panel as filled areas.
+/// Contours of a density over fractions of the panel as filled areas.
 fn contours(figure: &mut Figure, panel: &Panel, density: Option<&Density>) {
     let Some(density) = density else { return };
     for (share, (class, colour)) in
@@ -231,7 +231,7 @@ fn contours(figure: &mut Figure, panel: &Panel, density: Option<&Density>) {
         let paint = Paint { fill: Some(colour), stroke: Some(Stroke::new(BLUE, 0.7)), sharp: false };
         panel.clipped(figure, |figure| {
             if class == "area68" {
-                // the inner area has a colour of its own
+                // the inner area has a different colour
                 figure.path("area68-ground", path.clone(), Paint::fill(WHITE));
             }
             figure.path(class, path, paint);

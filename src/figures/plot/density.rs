@@ -1,10 +1,10 @@
-//! The density of draws in two dimensions, and the contours that hold given shares of it.
+//! The density of draws in two dimensions, and the contours that contain given fractions of it.
 //!
-//! A histogram under a Gaussian of the draws' own correlation, narrowed by the number of effective draws (0.9 of
+//! A histogram convolved with a Gaussian of the draws' correlation, narrowed by the number of effective draws (0.9 of
 //! Scott's rule), and divided by the part of the kernel that is inside: a posterior that ends at the edge of a prior
-//! keeps its height there. Along each axis it is as wide as the densest part of the draws asks for, not their tails or
-//! the distance between their modes. A contour holds its share of the draws themselves, for the density is wider than
-//! they are.
+//! keeps its height there. Along each axis its width follows from the densest part of the draws, not from their tails
+//! or the distance between their modes. A contour contains its fraction of the draws themselves, because the density is
+//! wider than they are.
 
 use crate::figures::drawing::contour::{Line, contour};
 
@@ -21,9 +21,9 @@ pub struct Density {
     pub x: Vec<f64>,
     /// The same along y.
     pub y: Vec<f64>,
-    /// Share of the draws in cell (i, j), at `j * x.len() + i`; smoothed.
+    /// Fraction of the draws in cell (i, j), at `j * x.len() + i`; smoothed.
     share: Vec<f64>,
-    /// Number of draws in each cell, as they are.
+    /// Number of draws in each cell, not smoothed.
     counts: Vec<f64>,
 }
 
@@ -35,17 +35,17 @@ fn moments(draws: &[[f64; 2]]) -> ([f64; 2], [[f64; 2]; 2]) {
     (mean, [[product(0, 0), product(0, 1)], [product(0, 1), product(1, 1)]])
 }
 
-/// Scale of the draws along an axis, a standard deviation for a Gaussian: the smallest of `sd`, what the quartiles say
-/// (tails), and what the shortest interval with a quarter of the draws says (several modes).
+/// Scale of the draws along an axis, a standard deviation for a Gaussian: the smallest of `sd`, the estimate from the
+/// quartiles (tails), and that from the shortest interval with a quarter of the draws (several modes).
 fn robust_scale(mut values: Vec<f64>, sd: f64) -> f64 {
-    // of a Gaussian of sd 1: distance between the quartiles, and twice the quantile of 0.625
+    // for a Gaussian of sd 1: distance between the quartiles, and twice the quantile of 0.625
     const QUARTILES: f64 = 1.349;
     const QUARTER: f64 = 0.637;
     values.sort_unstable_by(f64::total_cmp);
     let n = values.len();
     let quartiles = values[(3 * n / 4).min(n - 1)] - values[n / 4];
     let shortest = values.windows(n / 4 + 1).map(|w| w[n / 4] - w[0]).fold(f64::INFINITY, f64::min);
-    // where many draws are the same, only sd is left
+    // where many draws are equal, only sd is positive
     [quartiles / QUARTILES, shortest / QUARTER].into_iter().filter(|scale| *scale > 0.0).fold(sd, f64::min)
 }
 
@@ -80,7 +80,7 @@ impl Density {
         (total > 0.0).then(|| Density { x: centres(0), y: centres(1), share, counts: histogram })
     }
 
-    /// The density at which the cells of higher density hold a share of the draws.
+    /// The density at which the cells of higher density contain a fraction of the draws.
     pub fn level(&self, share: f64) -> f64 {
         let mut cells: Vec<(f64, f64)> = self.share.iter().copied().zip(self.counts.iter().copied()).collect();
         cells.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
@@ -93,13 +93,12 @@ impl Density {
         beyond.or(cells.last()).map_or(0.0, |(density, _)| *density)
     }
 
-    /// The contours that hold a share of the draws.
+    /// The contours that contain a fraction of the draws.
     pub fn contours(&self, share: f64) -> Vec<Line> {
         contour(&self.x, &self.y, |i, j| self.share[j * self.x.len() + i], self.level(share))
     }
 
-    /// The same as closed lines: around the rectangle the density is taken for zero, so that a line goes along its
-    /// border.
+    /// The same as closed lines: around the rectangle the density is set to zero, so that a line follows its border.
     pub fn outlines(&self, share: f64) -> Vec<Line> {
         let framed = |centres: &[f64]| {
             let half = 0.5 * (centres[1] - centres[0]);
@@ -114,7 +113,7 @@ impl Density {
         contour(&x, &y, at, self.level(share))
     }
 
-    /// Share of the draws in a cell.
+    /// Fraction of the draws in a cell.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.share[j * self.x.len() + i]
     }
@@ -129,7 +128,7 @@ struct Kernel {
 impl Kernel {
     fn new(covariance: [[f64; 2]; 2], effective: f64, step: [f64; 2]) -> Self {
         let h2 = (NARROWED * effective.max(10.0).powf(-1.0 / 6.0)).powi(2);
-        // in cells; not narrower than a cell can show
+        // in cells; not narrower than a cell resolves
         let cells = |a: usize, b: usize| h2 * covariance[a][b] / (step[a] * step[b]);
         let [xx, xy, yy] = [cells(0, 0) + 0.5, cells(0, 1), cells(1, 1) + 0.5];
         let determinant = xx * yy - xy * xy;
@@ -182,7 +181,7 @@ mod tests {
         for correlation in [0.0, 0.8] {
             let density = Density::of(&gaussian(40_000, correlation), 40_000.0, [[-5.0, 5.0]; 2]).unwrap();
             for share in [0.68, 0.95] {
-                // the radius that holds the share: 1.510 and 2.448 standard deviations
+                // the radius that contains the fraction: 1.510 and 2.448 standard deviations
                 let radius = (-2.0 * (1.0_f64 - share).ln()).sqrt();
                 let lines = density.contours(share);
                 let longest = lines.iter().max_by_key(|line| line.len()).unwrap();
@@ -211,7 +210,7 @@ mod tests {
         sides.filter(crosses).count() % 2 == 1
     }
 
-    /// Two narrow modes, and a mode with tails ten times as wide: the contours hold what they say, and are no wider
+    /// Two narrow modes, and a mode with tails ten times as wide: the contours contain their fraction, and are no wider
     /// than the modes.
     #[test]
     fn contours_of_several_modes_and_of_tails_hold_their_share() {

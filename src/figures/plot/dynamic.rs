@@ -1,15 +1,14 @@
-//! The dynamic spectrum: what changes in the profiles with rotation phase, observed and modelled, and what is left
-//! over.
+//! The dynamic spectrum: the changes of the profiles with rotation phase, observed and modelled, and the residuals.
 
 use super::profiles::{Line, extent};
 use crate::figures::drawing::colour::{ColourMap, GREY};
 use crate::figures::drawing::panel::{Shade, Sides, Tile};
 use crate::figures::drawing::{Align, Axis, Figure, Font, PAGE_MM, Paint, Panel, Rect};
 
-/// Half the phase that a profile fills, at most.
+/// Largest half-height of a profile in phase.
 const HALF_ROW: f64 = 0.015;
 
-/// Largest residual that has a colour of its own (standard errors).
+/// Residual at the end of the colour scale (standard errors).
 const RESIDUAL: f64 = 4.0;
 
 /// The figure of profiles with a model, which are in the order of their phase.
@@ -27,7 +26,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         .flat_map(|(line, mean)| line.observed.iter().zip(mean).map(|(x, mean)| 100.0 * (x - mean).abs()))
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max);
-    // of profiles that are all alike, too, zero is in the middle
+    // with identical profiles, zero is in the middle, too
     let largest = if largest > 0.0 { largest } else { 1.0 };
     let change = Shade { map: ColourMap::Diverging, low: -largest, high: largest };
     let left_over = Shade { map: ColourMap::Diverging, low: -RESIDUAL, high: RESIDUAL };
@@ -73,8 +72,8 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     figure
 }
 
-/// Mean observed profile of the data set of `own` in its bins. Profiles whose bins lie elsewhere, because each has a
-/// velocity of its own subtracted, are interpolated linearly.
+/// Mean observed profile of the data set of `own` in its bins. Profiles whose bins are offset, because a different
+/// velocity was subtracted from each, are interpolated linearly.
 fn mean(lines: &[Line], own: &Line) -> Vec<f64> {
     let of_set: Vec<&Line> = lines.iter().filter(|line| line.data_set == own.data_set).collect();
     let mean = |k: usize| {
@@ -88,7 +87,7 @@ fn mean(lines: &[Line], own: &Line) -> Vec<f64> {
     (0..own.observed.len()).map(mean).collect()
 }
 
-/// What a profile has at a velocity (km/s); `None` beyond its bins.
+/// The value of a profile at a velocity (km/s); `None` beyond its bins.
 fn observed_at(line: &Line, velocity_kms: f64) -> Option<f64> {
     let above = line.velocity_kms.partition_point(|v| *v < velocity_kms);
     if line.velocity_kms.get(above) == Some(&velocity_kms) {
@@ -107,7 +106,7 @@ pub(super) fn edges(centres: &[f64]) -> Vec<f64> {
     first.into_iter().chain(centres.iter().map(|v| v + 0.5 * step)).collect()
 }
 
-/// From which phase to which each profile is drawn: half way to its neighbours, [`HALF_ROW`] at most; in two parts
+/// The phase ranges in which each profile is drawn: half way to its neighbours, at most [`HALF_ROW`]; in two parts
 /// around 0.
 fn rows(lines: &[Line]) -> Vec<Vec<[f64; 2]>> {
     let phases: Vec<f64> = lines.iter().map(Line::phase).collect();
@@ -132,7 +131,7 @@ fn rows(lines: &[Line]) -> Vec<Vec<[f64; 2]>> {
 mod tests {
     use super::*;
 
-    /// A line that does not change shows no change, wherever its bins lie: `1 - v^2` is that of all profiles.
+    /// A constant line shows no change, whatever the positions of its bins: `1 - v^2` is that of all profiles.
     #[test]
     fn the_mean_is_of_all_profiles_of_a_set() {
         let line = |shift: f64, data_set: usize| {

@@ -1,4 +1,4 @@
-//! Rotation of the star as the config of a result has it.
+//! Rotation of the star from the config of a result.
 
 use serde_json::Value;
 

@@ -1,5 +1,5 @@
-//! What was injected on the star: spots and faculae of `truth.json`, or of the config that made a map. Spots that come
-//! and go are as in the middle of the data.
+//! The injected surface: spots and faculae of `truth.json`, or of the config of a map. Evolving spots are drawn at the
+//! middle of the data.
 
 use super::PlotError;
 use crate::data::io::map::{FIT, FitFile};
@@ -10,19 +10,19 @@ use crate::star::{Disc, Facula, Life, Spot};
 use serde_json::Value;
 use std::path::Path;
 
-/// What was injected.
+/// The injected surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Injected {
     pub spots: Vec<Spot>,
     pub faculae: Vec<Facula>,
-    /// Share of the surface that is spotted, where the file says so.
+    /// Spotted fraction of the surface, if the file contains it.
     pub coverage: Option<f64>,
-    /// Whether spots come and go.
+    /// Whether spots evolve.
     pub is_changing: bool,
 }
 
 impl Injected {
-    /// Of the folder, if it knows.
+    /// That of the folder, if known.
     pub fn of(folder: &Path) -> Result<Option<Self>, PlotError> {
         if folder.join(truth::FILE).is_file() {
             return Ok(Injected::of_truth(&origin::read(folder, truth::FILE)?));
@@ -34,14 +34,14 @@ impl Injected {
         let Some(simulate) = fit.provenance.config.pointer("/observations/simulate") else { return Ok(None) };
         let written: Vec<Vec<f64>> = serde_json::from_value(simulate["spots"].clone()).unwrap_or_default();
         let spots = spots(&written);
-        // the config alone does not say which spots are there
+        // the config alone does not determine the spots
         if simulate.get("random_spots").is_some() || spots.iter().any(|spot| spot.life.is_some()) {
             return Ok(None);
         }
         Ok(Some(Injected { spots, faculae: faculae(&simulate["faculae"]), coverage: None, is_changing: false }))
     }
 
-    /// Of a simulation; `None` of observed profiles that an orbit was put into.
+    /// From a simulation; `None` for observed profiles with an injected orbit.
     pub fn of_truth(truth: &TruthFile) -> Option<Self> {
         let TruthFile::Simulated(truth) = truth else { return None };
         let faculae = truth.faculae.as_ref().map(faculae).unwrap_or_default();
@@ -54,8 +54,8 @@ impl Injected {
     }
 }
 
-/// Spots as they are written: `[longitude, latitude, radius, filling]`, degrees, with the time of the largest area and
-/// the lifetime (d) where they come and go; others are left out.
+/// Spots in the written form: `[longitude, latitude, radius, filling]`, degrees, with the time of the largest area and
+/// the lifetime (d) where they evolve; others are omitted.
 fn spots(written: &[Vec<f64>]) -> Vec<Spot> {
     let spot = |numbers: &Vec<f64>| {
         let (&[longitude, latitude, radius, filling], rest) = numbers.split_first_chunk()?;
@@ -70,7 +70,7 @@ fn spots(written: &[Vec<f64>]) -> Vec<Spot> {
     written.iter().filter_map(spot).collect()
 }
 
-/// Faculae as they are written, `[longitude, latitude, radius, excess]` in degrees; others are left out.
+/// Faculae in the written form, `[longitude, latitude, radius, excess]` in degrees; others are omitted.
 fn faculae(written: &Value) -> Vec<Facula> {
     discs(written).map(|(disc, excess)| Facula { disc, excess }).collect()
 }

@@ -1,4 +1,4 @@
-//! A landscape: slices through its highest node and the lowest chi2 over the axis that is not shown, with the
+//! A likelihood grid: slices through its highest node and the lowest chi2 over the axis that is not shown, with the
 //! paraboloid and, where a run is given, the contours of its chain.
 
 use super::density::Density;
@@ -19,29 +19,29 @@ use crate::runs::origin;
 use crate::sampling::landscape::{Axis as GridAxis, Grid, Landscape};
 use std::path::Path;
 
-/// Root of the largest difference of chi2 that has a colour of its own.
+/// Root of the difference of chi2 at the end of the colour scale.
 const DARKEST: f64 = 10.0;
 
 /// Differences of chi2 of contours: 68 and 95 % of two Gaussian parameters.
 const LEVELS: [f64; 2] = [2.30, 5.99];
 
-/// All that is drawn.
+/// The content of the figures.
 struct Scene {
     grid: Grid,
     /// Values of the nodes along each axis, rising.
     nodes: Vec<Vec<f64>>,
-    /// Nodes that are there.
+    /// Number of computed nodes.
     computed: usize,
     /// chi2 minus the lowest, of each node; NaN without a value.
     delta: Vec<f64>,
-    /// Place of the lowest on each axis.
+    /// Index of the lowest on each axis.
     lowest: Vec<usize>,
     paraboloid: Option<Paraboloid>,
     truth: Vec<Option<f64>>,
     chain: Option<Sampled>,
 }
 
-/// The figures of the landscape in `folder`, with the chain of the run in folder `run`.
+/// The figures of the likelihood grid in `folder`, with the chain of the run in folder `run`.
 pub(super) fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
     let scene = Scene::read(folder, run)?;
     let mut figure = match scene.grid.axes.len() {
@@ -114,7 +114,7 @@ impl Scene {
         Axis::linear(&label(&self.grid.axes[k].name), [edges[0], edges[edges.len() - 1]])
     }
 
-    /// The landscape of a single parameter.
+    /// The likelihood grid of a single parameter.
     fn curve(&self) -> Figure {
         let mut figure = Figure::new("landscape", COLUMN_MM, 70.0);
         figure.caption =
@@ -143,7 +143,7 @@ impl Scene {
         figure
     }
 
-    /// Pairs of axes: slices above; below them, where there is a third axis, the lowest over it.
+    /// Pairs of axes: slices above; below them, with a third axis, the minima over it.
     fn planes(&self) -> Figure {
         let three = self.grid.axes.len() == 3;
         let pairs: &[[usize; 2]] = if three { &[[0, 1], [0, 2], [1, 2]] } else { &[[0, 1]] };
@@ -241,7 +241,7 @@ impl Scene {
             draws.collect::<Vec<f64>>()
         });
         let both: Vec<[f64; 2]> = draws[0].iter().zip(&draws[1]).map(|(x, y)| [*x, *y]).collect();
-        // where the draws are: the axes may reach much further
+        // the range of the draws: the axes may extend much further
         let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
         let range = draws.map(|draws| super::trace::shown_range(&draws, everywhere, None, Scale::Linear));
         let Some(density) = Density::of(&both, chain.effective(), range) else { return };
@@ -289,13 +289,13 @@ impl Scene {
     }
 }
 
-/// The landscape's own contours lie under all else, and are wide enough to be seen on both sides of a line that runs
+/// The contours of the likelihood grid are below all others, and wide enough to be visible on both sides of a line
 /// along them.
 const CONTOUR_PEN: Stroke = Stroke::new(Colour([40, 40, 40, 150]), 2.4);
 
 const CHAIN_PEN: Stroke = Stroke::new(BLUE, 1.1).dashed();
 
-/// Values of the nodes of an axis, rising: a periodic one leaves [0, 1) rather than wrap.
+/// Values of the nodes of an axis, rising: a periodic one leaves [0, 1) instead of wrapping.
 fn nodes(axis: &GridAxis) -> Vec<f64> {
     (0..axis.nodes).map(|k| axis.min + k as f64 * axis.spacing()).collect()
 }

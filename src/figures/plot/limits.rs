@@ -1,4 +1,4 @@
-//! The detection map: which share of the orbits of each period and semi-amplitude a blind search recovers.
+//! The detection map: the fraction of the orbits of each period and semi-amplitude that a blind search recovers.
 
 use super::{POSITIVE, PlotError};
 use crate::data::io::csv::Columns;
@@ -11,7 +11,7 @@ use crate::runs::limits::{Comparison, JSON, Limit, LimitsFile};
 use crate::runs::origin;
 use std::path::Path;
 
-/// The table beside it.
+/// The table with the fractions.
 const TABLE: &str = "limits.csv";
 
 /// The figures.
@@ -30,7 +30,7 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
     figure.caption = CAPTION.into();
     let (left, top) = (40.0, 24.0);
     let frame = Rect { left, top, width: figure.width - left - 56.0, height: figure.height - top - 46.0 };
-    // up to where a planet that was found is seen, too
+    // the range includes a detected planet
     let found = found(file);
     let edges = |values: &[f64], also: Option<f64>| {
         let also = also.filter(|x| *x > 0.0);
@@ -86,7 +86,7 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
         let text = format!("{}: {}", if found.was_removed { "removed" } else { "highest peak" }, found.words());
         let [x, y] = [panel.place(x, 1.0)[0], frame.top + 9.0];
         let width = width_pt(&text, Font::SMALL.size);
-        // to the side where there is room
+        // on the side with more space
         let left = if x > frame.centre()[0] { x - 5.0 - width } else { x + 5.0 };
         let ground = Rect { left: left - 2.0, top: y - 7.5, width: width + 4.0, height: 10.0 };
         figure.rect("label-ground", ground, Paint::fill(WHITE.opacity(0.85)));
@@ -105,13 +105,13 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
     Ok(figure)
 }
 
-/// The planet that the profiles show by themselves.
+/// The planet in the original profiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Found {
     period_d: f64,
-    /// Semi-amplitude (km/s), where the file has it.
+    /// Semi-amplitude (km/s), if the file contains it.
     k_kms: Option<f64>,
-    /// Whether it was taken out before orbits were injected.
+    /// Whether it was removed before orbits were injected.
     was_removed: bool,
 }
 
@@ -122,7 +122,7 @@ impl Found {
     }
 }
 
-/// The orbit that was taken out, or the peak of the profiles as they are where it is significant.
+/// The removed orbit, or the peak of the original profiles if it is significant.
 fn found(file: &LimitsFile) -> Option<Found> {
     match &file.removed {
         Some(orbit) => {
@@ -137,7 +137,7 @@ fn found(file: &LimitsFile) -> Option<Found> {
     }
 }
 
-/// Half the distance of neighbours on a logarithmic axis, as a factor; of one value alone some per cent.
+/// Half the distance of neighbours on a logarithmic axis, as a factor; for one value alone some per cent.
 fn half_step(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.to_vec();
     sorted.sort_by(f64::total_cmp);

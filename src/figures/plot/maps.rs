@@ -1,5 +1,5 @@
-//! Maps of a star that changes: one for each night, and the mean standard deviation, in flattened polar projection
-//! and in Mollweide's.
+//! Maps of an evolving star: one for each night, and the mean standard deviation, in flattened polar projection and in
+//! Mollweide's.
 
 use super::projection::{Projection, SOUTHERNMOST_DEG};
 use super::star_map::{degrees, parallels, rotation_arrow};
@@ -13,10 +13,10 @@ use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, 
 use crate::surface::SpotField;
 use std::path::Path;
 
-/// Profiles no further from a map's time than this (d) are of the same night.
+/// Profiles no further from a map's time than this (d) belong to the same night.
 const SAME_NIGHT_D: f64 = 0.5;
 
-/// Pixels of the whole star in a picture of 1 pt of radius: finer ones are not seen.
+/// Pixels of the whole star in a picture of 1 pt of radius: finer ones are invisible.
 const PIXELS_PER_PT2: f64 = 1.5;
 
 /// Numbers around small maps.
@@ -28,7 +28,7 @@ struct Night {
     filling: PixelMap,
 }
 
-/// All maps with what they have in common.
+/// All maps with their common properties.
 pub(super) struct Nights {
     maps: Vec<Night>,
     /// Mean standard deviation of the filling factors.
@@ -42,7 +42,7 @@ pub(super) struct Nights {
 }
 
 impl Nights {
-    /// The maps in `folder`, which `file` holds.
+    /// The maps in `folder`, from `file`.
     pub fn read(folder: &Path, file: &MapFile) -> Result<Self, PlotError> {
         let pixels: usize = file.ring_pixels.iter().sum();
         let wrong = |problem: &str| PlotError::Content { path: folder.join(MAP), problem: problem.into() };
@@ -73,13 +73,13 @@ impl Nights {
         let lowest = sd.values.iter().copied().fold(f64::MAX, f64::min);
         let amplitude = field.spot_amplitude;
         Ok(Nights {
-            // spots dark, what is brighter than the photosphere blue
+            // spots dark, pixels brighter than the photosphere blue
             filling_scale: Scale {
                 shade: Shade { map: ColourMap::Brightness, low: reach, high: -reach },
                 photosphere: 0.0,
             },
             sd_scale: Scale {
-                // from the next tenth of the amplitude below what is known best
+                // from the next tenth of the amplitude below the smallest value
                 shade: Shade {
                     map: ColourMap::Cividis,
                     low: amplitude * (10.0 * lowest / amplitude).floor().clamp(0.0, 9.0) / 10.0,
@@ -199,8 +199,8 @@ impl Nights {
         self.observed.iter().filter(move |[time, _]| near(*time)).map(|[_, cycle]| *cycle)
     }
 
-    /// What is around a polar map: phases, to the sides where no other map is; those observed; latitudes; and the
-    /// sense of rotation.
+    /// The labels around a polar map: phases, on sides without another map; those observed; latitudes; and the sense of
+    /// rotation.
     fn around(
         &self,
         figure: &mut Figure,
@@ -236,7 +236,7 @@ impl Nights {
         rotation_arrow(figure, corner, 4.0, if is_labelled { "rotation" } else { "" });
     }
 
-    /// What is beside a map in Mollweide's projection: latitudes to the left, longitudes below.
+    /// The labels beside a map in Mollweide's projection: latitudes to the left, longitudes below.
     fn beside(
         &self,
         figure: &mut Figure,
@@ -287,13 +287,13 @@ impl Nights {
 /// Room to the left and to the right (pt).
 const MARGIN: [f64; 2] = [15.0, 15.0];
 
-/// Width of the widest map with what is around it (pt).
+/// Width of the widest map with its labels (pt).
 const WIDEST: f64 = 165.0;
 
-/// Share of the pixels whose values have colours of their own: single ones beyond have that of the end.
+/// Fraction of the pixels within the colour scale: single ones beyond have the colour of its end.
 const SHOWN: f64 = 0.999;
 
-/// How far the scale of colours reaches to either side of 0: in steps of 0.05.
+/// Range of the colour scale to either side of 0: in steps of 0.05.
 fn reach<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     let mut sizes: Vec<f64> = values.map(|x| x.abs()).filter(|x| x.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -301,7 +301,7 @@ fn reach<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     ((20.0 * highest - 1e-9).ceil() / 20.0).clamp(0.05, 1.0)
 }
 
-/// How the star is shown.
+/// The projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Polar,
@@ -316,7 +316,7 @@ impl Kind {
         }
     }
 
-    /// Panels side by side, so that a page holds all nights of most campaigns.
+    /// Panels side by side, so that a page contains all nights of most campaigns.
     fn columns(self, panels: usize) -> usize {
         let most = match (self, panels) {
             (Kind::Polar, ..=20) => 5,
@@ -329,7 +329,7 @@ impl Kind {
         panels.min(most)
     }
 
-    /// Radius of a map in a cell so wide, and height of the cell (pt).
+    /// Radius of a map in a cell of that width, and height of the cell (pt).
     fn measures(self, cell: f64) -> (f64, f64) {
         match self {
             Kind::Polar => {

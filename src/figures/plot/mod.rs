@@ -1,7 +1,7 @@
-//! Figures of what a folder holds, from its files alone; nothing is computed anew.
+//! Figures of the results in a folder, from its files alone; nothing is recomputed.
 //!
-//! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
-//! `plan`, `optimise`, `grid`, `sample`, `compare` and `survey`.
+//! The files determine the figures: those of `simulate`, `inject`, `map`, `periodogram`, `limits`, `plan`, `optimise`,
+//! `grid`, `sample`, `compare` and `survey`.
 
 mod changes;
 mod comparison;
@@ -46,16 +46,16 @@ use crate::runs::run::CHAIN;
 use crate::runs::{self, blind_search, grid_scan, manifest, origin};
 use std::path::{Path, PathBuf};
 
-/// Pixels to the inch of PNG files where nothing else is asked for.
+/// Default resolution of PNG files in pixels per inch.
 pub const DPI: f64 = 200.0;
 
 /// Why there is no figure: one line that names file or folder.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// The folder is not there.
+    /// The folder does not exist.
     #[error("{}: no such folder", .0.display())]
     NoFolder(PathBuf),
-    /// There is nothing in it that could be drawn.
+    /// It contains nothing to draw.
     #[error("{}: nothing to draw: it holds none of {}", folder.display(), known_files().join(", "))]
     Nothing {
         /// The folder.
@@ -67,18 +67,18 @@ pub enum PlotError {
     /// A table is wrong.
     #[error(transparent)]
     Csv(#[from] FileError),
-    /// A chain or a landscape is wrong.
+    /// A chain or a likelihood grid is wrong.
     #[error(transparent)]
     Journal(#[from] JournalError),
     /// Profiles are wrong.
     #[error(transparent)]
     Profiles(#[from] LsdError),
-    /// A file is read, but does not say what it should.
+    /// A file can be read, but its content is wrong.
     #[error("{}: {problem}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }
@@ -92,7 +92,7 @@ const ANY: [f64; 2] = [-1e12, 1e12];
 /// Draws the figures of one kind of folder.
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
-/// The files by which a folder is known, with what draws it.
+/// The files that identify a folder, with the function that draws it.
 const KINDS: [(&str, Draw); 10] = [
     (MAP, star_map_figures),
     (blind_search::FILE, |folder, _| periodogram::figures(folder)),
@@ -110,21 +110,21 @@ fn known_files() -> Vec<&'static str> {
     KINDS.map(|(file, _)| file).to_vec()
 }
 
-/// The files by which a folder is known that are in it.
+/// The identifying files in a folder.
 pub fn kinds(folder: &Path) -> Vec<&'static str> {
     known_files().into_iter().filter(|file| folder.join(file).is_file()).collect()
 }
 
-/// All figures of what `folder` holds; over a landscape also the contours of the run in folder `run`.
+/// All figures of the results in `folder`; for a likelihood grid also the contours of the run in folder `run`.
 ///
 /// # Errors
-/// [`PlotError`]: a folder that is not there or holds nothing that is known, files that are wrong.
+/// [`PlotError`]: a folder that does not exist or has no known results, files that are wrong.
 pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
     if !folder.is_dir() {
         return Err(PlotError::NoFolder(folder.into()));
     }
     let here = kinds(folder);
-    // a simulation beside a map of it is drawn beside the map
+    // a simulation with a map of it is drawn beside the map
     let drawn = |file: &str| here.contains(&file) && (file != truth::FILE || !here.contains(&MAP));
     let mut figures: Vec<Figure> = Vec::new();
     for (_, draw) in KINDS.into_iter().filter(|(file, _)| drawn(file)) {
@@ -148,7 +148,7 @@ fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, Plot
         let problem = "maps: missing: an earlier version wrote this file; repeat `dimcmc map`".to_owned();
         return Err(OriginError::Content { path: folder.join(MAP), problem }.into());
     }
-    // maps of several times, with their errors, are small and many
+    // maps of several times, with their uncertainties, are small and many
     let mut figures = match file.field {
         Some(_) => maps::Nights::read(folder, &file)?.figures(),
         None => star_map::figures(folder, &file)?,
@@ -184,7 +184,7 @@ fn chain_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(vec![corner::figure(&sampled), trace::traces(&sampled), trace::autocorrelation(&sampled)])
 }
 
-/// Writes figures into `folder`, each as SVG and PNG; the names of the files.
+/// Writes figures into `folder`, each as SVG and PNG; returns the names of the files.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -12,7 +12,7 @@ use crate::runs::optimum::{FILE, OptimumFile};
 use crate::runs::origin;
 use std::path::Path;
 
-/// Standard deviations that hold 95 and 68 % of a Gaussian of two parameters.
+/// Standard deviations that contain 95 and 68 % of a Gaussian of two parameters.
 const RADII: [f64; 2] = [2.448, 1.510];
 
 /// The figure; none where there is no well-defined maximum.
@@ -50,7 +50,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let corner = Corner {
         shown: &shown,
         ranges: (0..n).map(|i| [best[i] - 3.6 * sd[i], best[i] + 3.6 * sd[i]].map(|x| factor(i) * x)).collect(),
-        // an ellipse is one on linear axes
+        // an ellipse requires linear axes
         scales: vec![Scale::Linear; n],
         truth: (0..n).map(truth).collect(),
         titles: (0..n).map(title).collect(),

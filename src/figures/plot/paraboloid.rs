@@ -1,4 +1,4 @@
-//! The paraboloid over a landscape: ellipses above its minimum, cut by a plane or projected onto it.
+//! The paraboloid of a likelihood grid: ellipses above its minimum, sections by a plane or projections onto it.
 
 use super::symbols::nearest_turn;
 use crate::figures::drawing::colour::VERMILION;
@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 /// The pen of its lines.
 pub(super) const PEN: Stroke = Stroke::new(VERMILION, 1.0);
 
-/// A paraboloid, in the order of the axes and in their turns.
+/// A paraboloid, in the order of the axes and in their cycles.
 pub(super) struct Paraboloid {
     pub vertex: Vec<f64>,
     pub error: Vec<f64>,
@@ -33,7 +33,7 @@ impl Paraboloid {
         })
     }
 
-    /// The ellipses so far (Delta chi2) above the minimum: projected onto the plane, with error bars (Delta chi2 = 1)
+    /// The ellipses at a given Delta chi2 above the minimum: projected onto the plane, with error bars (Delta chi2 = 1)
     /// as a cross at the vertex, or cut by the plane through the vertex.
     pub fn draw(&self, figure: &mut Figure, panel: &Panel, [i, j]: [usize; 2], levels: &[f64], projected: bool) {
         let centre = [self.vertex[i], self.vertex[j]];
@@ -62,7 +62,7 @@ fn invert([[a, b], [c, d]]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     (determinant > 0.0).then(|| [[d / determinant, -b / determinant], [-c / determinant, a / determinant]])
 }
 
-/// A value in the turn of the axis.
+/// A value in the cycle of the axis.
 pub(super) fn turned(axis: &Axis, nodes: &[f64], x: f64) -> f64 {
     if axis.periodic { nearest_turn(x, 0.5 * (nodes[0] + nodes[nodes.len() - 1])) } else { x }
 }

@@ -1,5 +1,5 @@
-//! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of
-//! observation alone do, and how well K is known.
+//! The periodogram: the improvement of the fit by an orbit of each period, the false-alarm levels, the window function,
+//! and the uncertainty of K.
 
 use super::symbols::{PERIOD_DIGITS, decimals};
 use super::{POSITIVE, PlotError, velocities};
@@ -16,7 +16,7 @@ use crate::runs::blind_search::{FILE, LevelRecord, OrbitRecord, PeakRecord, Peri
 use crate::runs::origin;
 use std::path::Path;
 
-/// What is marked in a periodogram.
+/// The marks in a periodogram.
 struct Marks<'a> {
     levels: &'a [LevelRecord],
     /// From high to low.
@@ -51,7 +51,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(figures)
 }
 
-/// A table of the periods searched.
+/// A table of the searched periods.
 fn table(folder: &Path, name: &str, file: &PeriodogramFile) -> Result<Columns, PlotError> {
     let table = Columns::read(&folder.join(name))?;
     table.check_rows(file.search.periods, &format!("the periods searched, by {FILE}"))?;
@@ -115,13 +115,13 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
     Ok(figure)
 }
 
-/// The curve through its trial periods and, between them, the peaks, which are known more closely.
+/// The curve through its trial periods and, between them, the peaks, which are known more precisely.
 fn with_peaks(mut curve: Vec<[f64; 2]>, peaks: &[PeakRecord]) -> Vec<[f64; 2]> {
     for peak in peaks {
         let at = [peak.orbit.period_d, peak.orbit.delta_ln_l];
         let inside = |pair: &[[f64; 2]]| (at[0] - pair[0][0]) * (at[0] - pair[1][0]) < 0.0;
         if let Some(k) = curve.windows(2).position(inside) {
-            // what is lower than the curve is none of its peaks
+            // a point below the curve is none of its peaks
             if curve[k][1] <= at[1] && curve[k + 1][1] <= at[1] {
                 curve.insert(k + 1, at);
             }
@@ -130,7 +130,7 @@ fn with_peaks(mut curve: Vec<[f64; 2]>, peaks: &[PeakRecord]) -> Vec<[f64; 2]> {
     curve
 }
 
-/// Lines that chance exceeds once in so many times, with their shares beside the panel, none over another.
+/// Lines of false-alarm probabilities, with their values beside the panel, without overlap.
 fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[LevelRecord]) {
     let right = panel.frame.right() + 4.0;
     let mut lowest = f64::NEG_INFINITY;
@@ -156,7 +156,7 @@ struct Mark {
     colour: Colour,
 }
 
-/// The periods that are marked: the day, the rotation period and its fractions, the injected period.
+/// The marked periods: the day, the rotation period and its fractions, the injected period.
 fn marked(rotation: f64, truth: Option<f64>) -> Vec<Mark> {
     let fractions = [(1.0, "*P*_{rot}"), (2.0, "*P*_{rot}/2"), (3.0, "*P*_{rot}/3"), (4.0, "*P*_{rot}/4")];
     let grey = Stroke::new(GREY, 0.7).dotted();
@@ -172,10 +172,10 @@ fn marked(rotation: f64, truth: Option<f64>) -> Vec<Mark> {
     fractions.map(rotation).into_iter().chain([day]).chain(injected).collect()
 }
 
-/// Marked periods, their texts above the panels in the lowest line that has room, and the highest peak.
+/// Marked periods, their texts above the panels in the lowest line with space, and the highest peak.
 fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, found: &Marks) {
     let above = panels[0];
-    // from where to where each line is taken
+    // occupied ranges of each line
     let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
     for mark in marked(rotation, found.truth.map(|truth| truth * rotation)) {
         if !(0.0..=1.0).contains(&above.x.share(mark.period_d)) {
@@ -205,7 +205,7 @@ fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitRecord) {
     let [x, y] = panel.place(peak.period_d, peak.delta_ln_l);
     panel.points(figure, "highest", &[[peak.period_d, peak.delta_ln_l]], (Marker::Disc, 3.6, BLUE));
     let width = width_pt(&text, Font::SMALL.size);
-    // beside the peak, where the panel has room
+    // beside the peak, where the panel has space
     let left = if x > panel.frame.centre()[0] { x - 6.0 - width } else { x + 6.0 };
     let ground = Rect { left: left - 1.0, top: y - 10.5, width: width + 2.0, height: 9.0 };
     figure.rect("label-ground", ground, Paint::fill(WHITE));

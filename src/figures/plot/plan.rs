@@ -1,5 +1,5 @@
-//! A plan for a proposal: the error of K, and the K that is detected, at every period, and how both fall from night to
-//! night; several schedules side by side in their colours.
+//! A plan for a proposal: the uncertainty of K, and the K that is detected, at every period, and the decrease of both
+//! from night to night; several schedules side by side in their colours.
 
 use super::{POSITIVE, PlotError};
 use crate::data::io::csv::Columns;
@@ -21,7 +21,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(std::iter::once(figure(&file, &table)?).chain(next).collect())
 }
 
-/// The standard error of K against the number of nights: the nights that are chosen, evenly spaced ones, random ones.
+/// The standard error of K as a function of the number of nights: the chosen nights, evenly spaced ones, random ones.
 fn next(choice: &Choice) -> Figure {
     let mut figure = Figure::new("plan_next", 0.62 * PAGE_MM, 74.0);
     let now = Some((0.0, choice.now.sigma_k_kms));
@@ -65,7 +65,7 @@ fn next(choice: &Choice) -> Figure {
     figure
 }
 
-/// Of a number, the colours repeat.
+/// The colours repeat after some number.
 fn colour(schedule: usize) -> Colour {
     SERIES[schedule % SERIES.len()]
 }
@@ -138,7 +138,7 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     Ok(figure)
 }
 
-/// All that is drawn against nights.
+/// All values that are drawn as functions of nights.
 fn medians(file: &PlanFile) -> impl Iterator<Item = f64> {
     file.schedules.iter().flat_map(|s| &s.after).flat_map(|after| [after.sigma_k_kms, after.k95_kms]).flatten()
 }

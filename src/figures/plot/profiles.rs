@@ -11,7 +11,7 @@ use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, P
 use crate::runs::origin;
 use std::path::Path;
 
-/// The table of profiles that `map` writes.
+/// The table of profiles by `map`.
 pub(super) const FILE: &str = "profiles.csv";
 
 /// A profile.
@@ -24,11 +24,11 @@ pub(super) struct Line {
     pub sigma: Vec<f64>,
     /// Empty without a model.
     pub model: Vec<f64>,
-    /// That of a star that does not change, beside that of one that does; empty without.
+    /// The model with static spots in addition to the evolving ones; empty without.
     pub unchanging: Vec<f64>,
-    /// Number of its data set, where there are several.
+    /// Number of its data set, if there are several.
     pub data_set: Option<usize>,
-    /// Factor on its errors, where the others do not predict it.
+    /// Factor on its uncertainties, where the others do not predict it.
     pub sigma_factor: Option<f64>,
 }
 
@@ -106,17 +106,17 @@ pub(super) fn extent(lines: &[Line], numbers: impl Fn(&Line) -> &[f64]) -> [f64;
     all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)])
 }
 
-/// Room for the cycles beside the profiles (pt).
+/// Space for the cycles beside the profiles (pt).
 const LABELS: f64 = 42.0;
 
-/// Profiles of a column.
+/// Profiles per column.
 const PER_COLUMN: usize = 17;
 
 /// The figure.
 pub(super) fn figure(lines: &[Line]) -> Figure {
     let columns = lines.len().div_ceil(PER_COLUMN).clamp(1, 4);
     let rows = lines.len().div_ceil(columns);
-    // as high as the profiles need, a page at most
+    // as high as the profiles need, at most a page
     let height_mm = (28.0 + 11.0 * rows as f64).clamp(60.0, 225.0);
     let width_mm = if columns == 1 { crate::figures::drawing::COLUMN_MM } else { PAGE_MM };
     let mut figure = Figure::new("profiles", width_mm, height_mm);
@@ -181,7 +181,7 @@ const OBSERVED: Stroke = Stroke::new(BLACK, 1.2);
 const EVENT: Stroke = Stroke::new(PURPLE, 1.2);
 const MODEL: Stroke = Stroke::new(VERMILION, 0.6);
 
-/// One profile, lowered by `down`.
+/// One profile, shifted down by `down`.
 fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let points = |y: &[f64]| line.velocity_kms.iter().zip(y).map(|(v, i)| [*v, i - down]).collect::<Vec<_>>();
     let observed = if line.sigma_factor.is_some() { EVENT } else { OBSERVED };
@@ -195,7 +195,7 @@ fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let sigma = line.sigma.iter().sum::<f64>() / line.sigma.len().max(1) as f64;
     let half = 0.5 * (panel.place(last, 0.0)[1] - panel.place(last, 2.0 * sigma)[1]);
     figure.polyline("sigma", &[[bar, middle - half], [bar, middle + half]], Stroke::new(BLACK, 1.0));
-    // beside the number of a data set there is room for two digits
+    // beside the number of a data set there is space for two digits
     let text = match line.data_set {
         None => format!("{turns:.0} + {:.3}", line.phase()),
         Some(set) => format!("{turns:.0} + {:.2} ({set})", line.phase()),
@@ -203,7 +203,7 @@ fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     figure.text(&text, [bar + 3.0, middle + 2.3], TINY, Align::Left, 0.0);
 }
 
-/// A bar that shows how much of the continuum a length upwards is.
+/// A bar with the vertical scale in units of the continuum.
 fn depth_bar(figure: &mut Figure, panel: &Panel, spacing: f64) {
     let power = 10f64.powf(spacing.log10().floor());
     let length = [5.0, 2.0, 1.0].into_iter().map(|f| f * power).find(|l| *l <= spacing * 1.001).unwrap_or(power);

@@ -2,9 +2,9 @@
 //! most published Doppler images) and Mollweide (equal areas).
 //!
 //! Both show the star as seen from its upper side. In the polar one the observer of cycle 0 is below the picture:
-//! longitude 0 is at the bottom and longitudes grow anticlockwise, the way the star turns; the phase at which a
-//! longitude faces the observer grows clockwise. In Mollweide's, longitudes grow to the right, 180 degrees in the
-//! middle.
+//! longitude 0 is at the bottom and longitudes increase anticlockwise, in the direction of rotation; the phase at which
+//! a longitude faces the observer increases clockwise. In Mollweide's, longitudes increase to the right, with 180
+//! degrees in the middle.
 
 use crate::figures::drawing::Point;
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
@@ -32,7 +32,7 @@ pub enum Projection {
 }
 
 impl Projection {
-    /// Where a longitude and latitude (degrees) are on the page.
+    /// The position of a longitude and latitude (degrees) on the page.
     pub fn place(&self, longitude_deg: f64, latitude_deg: f64) -> Point {
         match *self {
             Projection::Polar { centre, radius } => {
@@ -53,7 +53,7 @@ impl Projection {
         matches!(self, Projection::Mollweide { .. }) || latitude_deg >= SOUTHERNMOST_DEG
     }
 
-    /// The outline of a rectangle in longitude and latitude (degrees); what is too far south is cut off.
+    /// The outline of a rectangle in longitude and latitude (degrees); parts too far south are cut off.
     pub fn patch(&self, longitude: [f64; 2], latitude: [f64; 2]) -> Vec<Point> {
         let south = if let Projection::Polar { .. } = self { latitude[0].max(SOUTHERNMOST_DEG) } else { latitude[0] };
         let north = latitude[1].max(south);
@@ -70,7 +70,7 @@ impl Projection {
     }
 }
 
-/// Shares from 0 to 1 in steps of at most `longest` of `extent`.
+/// Fractions from 0 to 1 in steps of at most `longest` of `extent`.
 fn steps(extent: f64, longest: f64) -> Vec<f64> {
     let count = (extent.abs() / longest).ceil().max(1.0) as usize;
     (0..=count).map(|k| k as f64 / count as f64).collect()
@@ -82,7 +82,7 @@ fn auxiliary(latitude: f64) -> f64 {
         return latitude.signum() * FRAC_PI_2;
     }
     let goal = PI * latitude.sin();
-    // close to the poles the root is a cube root: begin there beyond it
+    // close to the poles the root is a cube root: the iteration begins beyond it
     let mut theta = latitude * (1.0 - 0.2 * (latitude / FRAC_PI_2).powi(2) / SQRT_2);
     for _ in 0..60 {
         let slope = 2.0 + 2.0 * (2.0 * theta).cos();

@@ -1,4 +1,4 @@
-//! Light curves and activity indicators: measurements, what the most probable maps make of them, and the difference.
+//! Light curves and activity indicators: measurements, their model by the most probable maps, and the residuals.
 
 use super::times::{Clock, Stretch, stretches};
 use super::{ANY, PlotError};
@@ -36,7 +36,7 @@ pub(super) fn light_curves(folder: &Path) -> Result<Figure, PlotError> {
     Ok(figure(("lightcurve", caption), &data, ("flux", &|_| "relative flux".into())))
 }
 
-/// The activity indicators that count, two panels each.
+/// The activity indicators in use, two panels each.
 pub(super) fn indicators(folder: &Path) -> Result<Figure, PlotError> {
     let table = Columns::read(&folder.join(INDICATORS))?;
     let data = data(&table, "value", ["indicator", "indicator"])?;
@@ -68,7 +68,7 @@ fn data(table: &Columns, value: &str, part: [&str; 2]) -> Result<Vec<Datum>, Plo
     Ok((0..time_d.len()).map(datum).collect())
 }
 
-/// The figure of all series; `measured` is what a measurement is called, and the label of the axis of each series.
+/// The figure of all series; `measured` is the name of a measurement, and the label of the axis of each series.
 fn figure((name, caption): (&str, &str), data: &[Datum], (measured, label): (&str, &dyn Fn(f64) -> String)) -> Figure {
     let all: Vec<&[Datum]> = data.chunk_by(|a, b| a.part[0] == b.part[0]).collect();
     let mut figure = Figure::new(name, PAGE_MM, 20.0 + 52.0 * all.len() as f64);

@@ -1,4 +1,4 @@
-//! The map of the star: flattened polar projection and Mollweide's, beside it the injected map where it is known.
+//! The map of the star: flattened polar projection and Mollweide's, with the injected map if it is known.
 
 use super::content::Content;
 use super::ephemeris::ephemeris;
@@ -21,17 +21,17 @@ struct Star {
     title: String,
     /// Its pixels, or the discs on it.
     surface: Surface,
-    /// What was injected: its rims are drawn over pixels.
+    /// The injected surface: its rims are drawn over pixels.
     rims: Injected,
 }
 
 enum Surface {
     Pixels(PixelMap),
-    /// Each with what a map holds inside it.
+    /// Each with the map's value inside it.
     Discs(Vec<(Disc, f64)>),
 }
 
-/// The map in `folder`, which `file` holds; of several seasons a map each.
+/// The map in `folder`, from `file`; one map per season for several.
 pub(super) fn figures(folder: &Path, file: &MapFile) -> Result<Vec<Figure>, PlotError> {
     let of_season = |(k, map): (usize, &MapAt)| {
         let (season, spottedness) = (map.season?, map.spottedness?);
@@ -54,7 +54,7 @@ pub(super) fn figures(folder: &Path, file: &MapFile) -> Result<Vec<Figure>, Plot
     seasons.into_iter().map(of_season).collect()
 }
 
-/// One map of a `file`; of a season with its number and what is said of it.
+/// One map of a `file`; for a season with its number and description.
 fn figure(folder: &Path, file: &MapFile, map: OneMap, season: Option<(usize, String)>) -> Result<Figure, PlotError> {
     let (content, values) = match map.pixels {
         MapColumns::BrightAndDark { brightness, .. } => {
@@ -68,7 +68,7 @@ fn figure(folder: &Path, file: &MapFile, map: OneMap, season: Option<(usize, Str
         let problem = format!("ring_pixels and {what} do not belong together");
         return Err(PlotError::Content { path: folder.join(MAP), problem });
     }
-    // what was injected is known at cycle 0 alone, or in the middle of all data
+    // the injected surface is known at cycle 0 only, or in the middle of all data
     let known = Injected::of(folder)?.filter(|_| season.is_none());
     let cycles = match folder.join(velocities::FILE) {
         table if table.is_file() => {
@@ -109,7 +109,7 @@ fn figure(folder: &Path, file: &MapFile, map: OneMap, season: Option<(usize, Str
 
 /// The injected map of the simulation in `folder`.
 ///
-/// `None` of observed profiles that an orbit was put into.
+/// `None` for observed profiles with an injected orbit.
 pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     let file: TruthFile = origin::read(folder, truth::FILE)?;
     let Some(injected) = Injected::of_truth(&file) else { return Ok(None) };
@@ -127,7 +127,7 @@ pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     Ok(Some(draw(&[star], content, &cycles, text)))
 }
 
-/// How phases and longitudes are to be read.
+/// Explanation of phases and longitudes.
 const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above the visible pole: parallels at +60, \
 +30, 0 \
                            (bold) and -30 degrees, the star turns anticlockwise, numbers outside are the rotation \
@@ -169,7 +169,7 @@ impl Star {
     }
 }
 
-/// One star: the projections side by side; two stars: a column each.
+/// One star: the projections side by side; two stars: one column each.
 fn draw(stars: &[Star], content: Content, cycles: &[f64], caption: String) -> Figure {
     let two = stars.len() > 1;
     let mut figure = Figure::new("map", PAGE_MM, if two { 136.0 } else { 92.0 });
@@ -239,7 +239,7 @@ pub(super) fn degrees(latitude: f64) -> String {
     if latitude == 0.0 { "0°".to_owned() } else { format!("{latitude:+}°") }
 }
 
-/// An arrow on an arc with the way the star turns, anticlockwise, and a text below it.
+/// An arrow on an arc in the direction of rotation, anticlockwise, and a text below it.
 pub(super) fn rotation_arrow(figure: &mut Figure, at: Point, radius: f64, text: &str) {
     let on = |degrees: f64, radius: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
@@ -260,11 +260,11 @@ fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, scale: Sca
     star.paint(figure, projection, scale);
     for latitude in [-60.0, -30.0, 0.0, 30.0, 60.0_f64] {
         let at = projection.place(0.0, latitude);
-        // clear of the edge, which leans where it is far from the equator
+        // away from the edge, which is inclined far from the equator
         let text = [at[0] - 3.0 - latitude.abs() / 14.0, at[1] + 2.5];
         figure.text(&degrees(latitude), text, Font::SMALL, Align::Right, 0.0);
     }
-    // in the corner that the ellipse leaves free
+    // in the corner outside the ellipse
     let corner = [projection.place(0.0, 0.0)[0] - 14.0, centre[1] - radius + 3.0];
     figure.text("latitude", corner, Font::LABEL, Align::Left, 0.0);
     let below = centre[1] + radius + 9.0;

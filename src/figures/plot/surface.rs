@@ -1,4 +1,4 @@
-//! What is on the star and how it is painted: a map of pixels, or discs.
+//! The painted surface of the star: a map of pixels, or discs.
 
 use super::projection::{Projection, SOUTHERNMOST_DEG};
 use crate::figures::drawing::colour::{BLACK, GREY};
@@ -7,7 +7,7 @@ use crate::figures::drawing::{Colour, Figure, Paint, Point, Segment, Stroke, clo
 use crate::star::{Disc, Quadrature, SurfaceGrid};
 use std::collections::BTreeMap;
 
-/// Colours of what a map holds, and what it holds where there is nothing but photosphere.
+/// Colours of the values of a map, and the value of the photosphere.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub shade: Shade,
@@ -20,23 +20,23 @@ impl Scale {
     }
 }
 
-/// What pixels of equal area hold, in rings of constant latitude, south to north.
+/// Values of pixels of equal area, in rings of constant latitude, south to north.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PixelMap {
     pub ring_pixels: Vec<usize>,
     pub values: Vec<f64>,
 }
 
-/// Latitude (degrees) by which rings overlap on the page, lest the ground shows between them.
+/// Latitude (degrees) by which rings overlap on the page, so that the background does not show between them.
 const OVERLAP_DEG: f64 = 0.15;
 
 impl PixelMap {
-    /// Whether the rings hold all pixels.
+    /// Whether the rings contain all pixels.
     pub fn is_whole(&self) -> bool {
         !self.values.is_empty() && self.ring_pixels.iter().sum::<usize>() == self.values.len()
     }
 
-    /// The same on some `pixels`, if it has more: each what the map holds at its centre.
+    /// The same on some `pixels`, if it has more: each with the map's value at its centre.
     pub fn coarser(&self, pixels: usize) -> PixelMap {
         if pixels >= self.values.len() {
             return self.clone();
@@ -47,7 +47,7 @@ impl PixelMap {
         PixelMap { ring_pixels: grid.rings.iter().map(|ring| ring.pixels.len()).collect(), values }
     }
 
-    /// What the map holds at a longitude (degrees) and latitude (rad).
+    /// The map's value at a longitude (degrees) and latitude (rad).
     fn at(&self, longitude_deg: f64, latitude: f64) -> f64 {
         let share = 0.5 * (latitude.sin() + 1.0) * self.values.len() as f64;
         let mut below = 0;
@@ -61,7 +61,7 @@ impl PixelMap {
         f64::NAN
     }
 
-    /// Paints the map; neighbours of one colour are one patch, and the colour of the photosphere is the ground.
+    /// Paints the map; neighbours of one colour are one patch, and the colour of the photosphere is the background.
     pub fn paint(&self, figure: &mut Figure, projection: Projection, scale: Scale) {
         let (shade, photosphere) = (scale.shade, scale.ground());
         let total = self.values.len() as f64;
@@ -95,7 +95,7 @@ impl PixelMap {
     }
 }
 
-/// Paints discs with what a map holds inside them, one over the other.
+/// Paints discs with the map's value inside them, one over the other.
 pub(super) fn paint_discs(figure: &mut Figure, projection: Projection, discs: &[(Disc, f64)], scale: Scale) {
     for (disc, value) in discs {
         let paint = Paint::fill(scale.shade.colour(*value).unwrap_or(scale.ground()));
@@ -103,12 +103,12 @@ pub(super) fn paint_discs(figure: &mut Figure, projection: Projection, discs: &[
     }
 }
 
-/// Draws the rim of a disc that was injected.
+/// Draws the rim of an injected disc.
 pub(super) fn outline(figure: &mut Figure, class: &'static str, projection: Projection, disc: &Disc, stroke: Stroke) {
     rims(figure, class, projection, disc, Paint::stroke(stroke));
 }
 
-/// A disc as closed lines: in Mollweide's projection once more to either side, for what goes around behind the star.
+/// A disc as closed lines: in Mollweide's projection repeated to either side, for parts beyond the edge.
 fn rims(figure: &mut Figure, class: &'static str, projection: Projection, disc: &Disc, paint: Paint) {
     let around: Vec<[f64; 2]> = (0..=120).map(|k| rim(disc, 3.0 * f64::from(k))).collect();
     let places = |turn: f64, around: &[[f64; 2]]| -> Vec<Point> {
@@ -122,7 +122,7 @@ fn rims(figure: &mut Figure, class: &'static str, projection: Projection, disc: 
             let mut whole = unrolled(&around);
             let turned = whole[whole.len() - 1][0] - whole[0][0];
             if turned.abs() > 180.0 {
-                // around a pole: the area reaches up to it
+                // around a pole: the area extends up to it
                 let pole = 90.0_f64.copysign(disc.latitude);
                 whole.extend([[whole[whole.len() - 1][0], pole], [whole[0][0], pole]]);
             }

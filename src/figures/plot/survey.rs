@@ -1,5 +1,5 @@
-//! A sample of stars: the completeness of all searches together with the planets found, and the posterior of the rate
-//! of planets.
+//! A sample of stars: the total completeness of all searches with the planets found, and the posterior of the rate of
+//! planets.
 
 use super::{POSITIVE, PlotError};
 use crate::data::io::csv::Columns;
@@ -36,7 +36,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// `None` where the table has none by that size.
+    /// `None` where the table has none for that size.
     fn read(table: &Columns, size: Size) -> Result<Option<Sum>, PlotError> {
         let (star, period) = (table.column("star")?, table.column_within("period_d", POSITIVE)?);
         let (k, mass, stars) = (table.column("k_kms")?, table.column("msini_mjup")?, table.column("completeness")?);
@@ -59,7 +59,7 @@ impl Sum {
         self.stars[i * self.sizes.len() + j]
     }
 
-    /// The size from which on the sum stays at `level` or above, at each period.
+    /// The size above which the sum stays at `level` or above, at each period.
     fn reached(&self, level: f64) -> Vec<[f64; 2]> {
         let at = |i: usize| {
             let below = (0..self.sizes.len()).rposition(|j| self.at(i, j) < level);
@@ -96,7 +96,7 @@ fn map(file: &SurveyFile, table: &Columns, size: Size) -> Result<Option<Figure>,
         file.stars.iter().filter_map(|star| signal(file, star, size)).collect();
     let ends = |of: &[f64], step: f64, also: &mut dyn Iterator<Item = f64>| {
         let whole = [of[0] / step, of[of.len() - 1] * step];
-        // a signal beyond what was injected is shown, too
+        // the range includes signals beyond the injected one
         let beyond = also.filter(|x| *x > 0.0 && !(whole[0]..=whole[1]).contains(x));
         beyond.fold(whole, |[low, high], x| [low.min(x / 1.2), high.max(1.2 * x)])
     };
@@ -143,7 +143,7 @@ fn map(file: &SurveyFile, table: &Columns, size: Size) -> Result<Option<Figure>,
     Ok(Some(figure))
 }
 
-/// The signal of a star that counts: period, size, and the error of the size.
+/// The signal of a counted star: period, size, and the uncertainty of the size.
 fn signal<'a>(file: &SurveyFile, star: &'a StarRecord, size: Size) -> Option<(&'a StarRecord, [f64; 2], f64)> {
     let chance = star.false_alarm_probability.filter(|p| star.counted && *p < file.false_alarm_probability);
     chance?;
@@ -154,7 +154,7 @@ fn signal<'a>(file: &SurveyFile, star: &'a StarRecord, size: Size) -> Option<(&'
     }
 }
 
-/// Points with error bars, and the names of their stars where these have room.
+/// Points with error bars, and the names of their stars where there is space.
 fn signals(figure: &mut Figure, panel: &Panel, found: &[(&StarRecord, [f64; 2], f64)], factor: f64) {
     let mut taken: Vec<Rect> = Vec::new();
     for (_, [x, y], sigma) in found {
@@ -190,7 +190,7 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 /// Most panels in a row.
 const COLUMNS: usize = 2;
 
-/// The posterior of each rate, a panel for each box and a colour for each group.
+/// The posterior of each rate, one panel per box and one colour per group.
 fn rates(file: &SurveyFile) -> Figure {
     let boxes = file.boxes.len().max(1);
     let (columns, rows) = (boxes.min(COLUMNS), boxes.div_ceil(COLUMNS));
@@ -220,11 +220,11 @@ fn posterior(figure: &mut Figure, frame: Rect, rates: &[&RateRecord]) {
     let end = rates.iter().map(|rate| 100.0 * rate.ci95[1]).fold(1.0, f64::max);
     let range = [0.0, (1.35 * end).min(100.0)];
     let inside = |rate: &RateRecord| -> Vec<[f64; 2]> {
-        // per cent on the axis: the density is per cent, too
+        // per cent on the axis: the density is per per cent, too
         let all = rate.rate.iter().zip(&rate.density).map(|(x, y)| [100.0 * x, 0.01 * y]);
         all.filter(|[x, y]| *x <= range[1] && y.is_finite()).collect()
     };
-    // a prior without bound at 0 leaves the panel there
+    // with an unbounded density at 0 the curve leaves the panel there
     let height = |rate: &RateRecord| {
         inside(rate).iter().filter(|[x, _]| *x > 0.01 * range[1]).map(|[_, y]| *y).fold(0.0, f64::max)
     };

@@ -1,4 +1,4 @@
-//! The symbols of astronomers for parameters.
+//! The symbols of parameters in astronomy.
 
 use crate::figures::drawing::Axis;
 use crate::model::Parameter;
@@ -10,9 +10,9 @@ pub const PERIOD_DIGITS: usize = 4;
 /// Unit of phi: the part of an orbit from the epoch to the largest radial velocity.
 const PHASE_UNIT: &str = "cycles to max. RV";
 
-/// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
+/// Symbol and unit of a parameter by its name in files; the name itself for other parameters.
 pub fn symbol(name: &str) -> (&str, &'static str) {
-    // spots have no symbols that everyone knows
+    // spots have no established symbols
     match name {
         "spot_amplitude" => return ("spot amplitude", ""),
         "spot_slope" => return ("power-law index of spots", ""),
@@ -45,7 +45,7 @@ fn unit(parameter: Parameter) -> &'static str {
 }
 
 impl Speeds {
-    /// An axis of them.
+    /// A velocity axis in this unit.
     pub fn axis(self, label: &str, range_kms: [f64; 2]) -> Axis {
         Axis::linear(&format!("{label} ({})", self.name), range_kms.map(|kms| self.factor * kms))
     }
@@ -62,17 +62,17 @@ pub fn label(name: &str) -> String {
     }
 }
 
-/// A parameter as figures show it: periods in days, small velocities in m/s.
+/// A parameter in figures: periods in days, small velocities in m/s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
     symbol: String,
     unit: &'static str,
-    /// What its values are multiplied by.
+    /// Factor on its values.
     pub factor: f64,
 }
 
 impl Shown {
-    /// The parameter of a name whose values reach up to `largest`, of a star with a rotation period (d).
+    /// The parameter with a name and values up to `largest`, for a star with a rotation period (d).
     pub fn of(name: &str, rotation_period_d: Option<f64>, largest: f64) -> Self {
         let (symbol, unit) = symbol(name);
         let shown = |symbol: &str, unit, factor| Shown { symbol: symbol.to_owned(), unit, factor };
@@ -98,7 +98,7 @@ impl Shown {
     }
 }
 
-/// What is said of a parameter above a panel.
+/// The title of a parameter above a panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Title {
     symbol: String,
@@ -109,15 +109,15 @@ pub struct Title {
 }
 
 impl Title {
-    /// Lines that a title has at most.
+    /// Largest number of lines of a title.
     pub const LINES: usize = 3;
 
-    /// A value with its error bars, downwards and upwards, not yet multiplied; `sigma` has two digits.
+    /// A value with its error bars, downwards and upwards, before multiplication; `sigma` has two digits.
     pub fn value(shown: &Shown, value: f64, [down, up]: [f64; 2], sigma: f64) -> Self {
         let digits = decimals(shown.factor * sigma);
         let [value, down, up] = [value, down, up].map(|x| format!("{:.digits$}", shown.factor * x));
         let unit = match shown.unit {
-            // those of a phase go without saying
+            // the unit of a phase is omitted
             "" | PHASE_UNIT => String::new(),
             "°" => "°".to_owned(),
             unit => format!(" {unit}"),
@@ -130,12 +130,12 @@ impl Title {
         }
     }
 
-    /// Of a parameter that the data do not constrain, so that no value means anything.
+    /// For a parameter that the data do not constrain, so that no value is meaningful.
     pub fn unconstrained(shown: &Shown) -> Self {
         Title { symbol: shown.symbol.clone(), value: None, errors: String::new(), unit: String::new() }
     }
 
-    /// In so many lines, [`Title::LINES`] at most.
+    /// In so many lines, at most [`Title::LINES`].
     pub fn lines(&self, lines: usize) -> Vec<String> {
         let Title { symbol, value, errors, unit } = self;
         match (value, lines) {
@@ -152,12 +152,12 @@ impl Title {
     }
 }
 
-/// `x` by the whole number of turns that brings it nearest to `centre`, for a periodic parameter (period 1).
+/// `x` shifted by the whole number of cycles that brings it nearest to `centre`, for a periodic parameter (period 1).
 pub fn nearest_turn(x: f64, centre: f64) -> f64 {
     x - (x - centre).round()
 }
 
-/// Decimals that show two digits of `error`.
+/// Decimals for two digits of `error`.
 pub fn decimals(error: f64) -> usize {
     if error > 0.0 && error.is_finite() { (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 }
 }

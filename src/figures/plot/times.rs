@@ -1,14 +1,14 @@
-//! Time axes: days less a constant, and stretches of time between long gaps, each with a part of the width.
+//! Time axes: days minus a constant, and stretches of time between long gaps, each with a part of the width.
 
 use crate::figures::drawing::Axis;
 
-/// Times below this (d) are written as they are.
+/// Times below this (d) are written without subtracting a constant.
 const SMALL_D: f64 = 1000.0;
 
 /// Julian dates are above this (d).
 const JULIAN_D: f64 = 2_400_000.0;
 
-/// Days as they are written: less a constant.
+/// The time scale of labels: days minus a constant.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Clock {
     /// The constant (d).
@@ -18,7 +18,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// That of some times (d).
+    /// The scale for some times (d).
     pub fn of(times_d: impl Iterator<Item = f64>) -> Self {
         let first = times_d.filter(|time| time.is_finite()).fold(f64::INFINITY, f64::min);
         if !first.is_finite() || first < SMALL_D {
@@ -30,23 +30,23 @@ impl Clock {
     }
 }
 
-/// Least gap (d) that divides an axis, and as a share of all the time.
+/// Smallest gap (d) that divides an axis, and as a fraction of the total time.
 const GAP_D: f64 = 15.0;
 const GAP_SHARE: f64 = 0.1;
 
-/// Least width of a stretch as a share of all of them.
+/// Smallest width of a stretch as a fraction of all of them.
 const LEAST: f64 = 0.15;
 
 /// Between stretches on the page (pt).
 const BETWEEN: f64 = 9.0;
 
-/// Room before the first and after the last time of a stretch, as a share of its length.
+/// Margin before the first and after the last time of a stretch, as a fraction of its length.
 const MARGIN: f64 = 0.04;
 
-/// A stretch of time without a long gap, and where it is on the page.
+/// A stretch of time without a long gap, and its position on the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stretch {
-    /// From when to when (d), with some room.
+    /// First and last time (d), with a margin.
     pub range_d: [f64; 2],
     /// Its left side (pt).
     pub left: f64,
@@ -60,13 +60,13 @@ impl Stretch {
         (self.range_d[0]..=self.range_d[1]).contains(&time_d)
     }
 
-    /// Its axis by a clock.
+    /// Its axis with a time scale.
     pub fn axis(&self, clock: &Clock) -> Axis {
         Axis::linear("", self.range_d.map(|time| time - clock.zero_d))
     }
 }
 
-/// The stretches of some times, side by side from `left` on.
+/// The stretches of some times, side by side from `left`.
 pub(super) fn stretches(times_d: impl Iterator<Item = f64>, left: f64, width: f64) -> Vec<Stretch> {
     let mut times: Vec<f64> = times_d.filter(|time| time.is_finite()).collect();
     times.sort_by(f64::total_cmp);

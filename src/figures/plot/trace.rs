@@ -1,4 +1,4 @@
-//! A chain: what was sampled as figures need it, its walkers over the steps, and how long it remembers.
+//! A chain: its samples for figures, its walkers as functions of step, and its autocorrelation.
 
 use super::PlotError;
 use super::ephemeris::ephemeris;
@@ -19,19 +19,19 @@ use std::path::Path;
 /// A chain with its summary.
 #[derive(Debug)]
 pub struct Sampled {
-    /// What the run was begun with.
+    /// The manifest of the run.
     pub manifest: Manifest,
     /// All its steps.
     pub chain: Chain,
     /// The prior of each parameter.
     pub priors: Vec<Prior>,
-    /// What sort of number each is.
+    /// The kind of each parameter.
     pub kinds: Vec<ParameterKind>,
-    /// What every parameter must reach.
+    /// Goals for every parameter.
     pub goals: Goals,
-    /// What the chain says.
+    /// The summary of the chain.
     pub summary: RunSummary,
-    /// Injected values of the parameters and of what follows from them.
+    /// Injected values of the parameters and of derived quantities.
     pub truth: Option<BTreeMap<String, f64>>,
 }
 
@@ -52,14 +52,14 @@ impl Sampled {
         Ok(Sampled { manifest, chain, priors, kinds, goals, summary, truth })
     }
 
-    /// How figures show parameter `i`.
+    /// The representation of parameter `i` in figures.
     pub(super) fn shown(&self, i: usize) -> Shown {
         let name = &self.summary.names[i];
         let rotation_period_d = ephemeris(&self.manifest.origin.config).map(|(period_d, _)| period_d);
         Shown::of(name, rotation_period_d, self.summary.parameters[name].ci95[1])
     }
 
-    /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
+    /// Draws of parameter `i` after the burn-in; a periodic one within half a cycle of its mode.
     pub(super) fn draws(&self, i: usize) -> Vec<f64> {
         let series = self.chain.series(i, self.summary.discarded_steps);
         let mut draws: Vec<f64> = series.into_iter().flatten().flatten().collect();
@@ -69,13 +69,13 @@ impl Sampled {
         draws
     }
 
-    /// Mode of a periodic parameter, in the turn of its median: the axis around it shows the values of tables.
+    /// Mode of a periodic parameter, in the cycle of its median: the axis around it shows the values of tables.
     fn mode(&self, i: usize) -> Option<f64> {
         let one = &self.summary.parameters[&self.summary.names[i]];
         (self.kinds[i] == ParameterKind::Periodic).then(|| nearest_turn(one.mode, one.median))
     }
 
-    /// How values of a parameter become lengths: by their logarithms where the prior is even in these.
+    /// The scale of a parameter: logarithmic where the prior is uniform in the logarithm.
     pub(super) fn scale(&self, i: usize) -> Scale {
         if matches!(self.priors[i], Prior::LogUniform { .. }) { Scale::Log } else { Scale::Linear }
     }
@@ -89,26 +89,26 @@ impl Sampled {
         series
     }
 
-    /// The injected value, in the turn of the draws.
+    /// The injected value, in the cycle of the draws.
     pub(super) fn truth(&self, i: usize) -> Option<f64> {
         let truth = *self.manifest.origin.truth.as_ref()?.get(&self.summary.names[i])?;
         Some(self.mode(i).map_or(truth, |mode| nearest_turn(truth, mode)))
     }
 
-    /// The same where it is not so far from the draws that these would shrink beside it.
+    /// The same unless it is so far from the draws that they would be compressed.
     pub(super) fn near_truth(&self, i: usize) -> Option<f64> {
         let one = &self.summary.parameters[&self.summary.names[i]];
         let median = self.mode(i).map_or(one.median, |mode| nearest_turn(one.median, mode));
         self.truth(i).filter(|truth| (truth - median).abs() < NEAR * one.sd)
     }
 
-    /// Effective draws of the parameter that has fewest.
+    /// Effective draws of the parameter with the fewest.
     pub(super) fn effective(&self) -> f64 {
         let least = self.summary.parameters.values().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 100.0 }
     }
 
-    /// From where to where the prior of a parameter reaches.
+    /// The range of a parameter's prior.
     pub(super) fn bounds(&self, i: usize) -> [f64; 2] {
         self.mode(i).map_or(self.priors[i].bounds().into(), |mode| [mode - 0.5, mode + 0.5])
     }
@@ -117,12 +117,12 @@ impl Sampled {
 /// Standard deviations from the median within which an injected value widens an axis.
 const NEAR: f64 = 8.0;
 
-/// Walkers of each ensemble that are drawn.
+/// Number of walkers of each ensemble that are drawn.
 const WALKERS: usize = 4;
-/// Steps that are drawn, about.
+/// Approximate number of steps that are drawn.
 const STEPS: usize = 500;
 
-/// The walkers over the steps.
+/// The walkers as functions of step.
 pub(super) fn traces(sampled: &Sampled) -> Figure {
     let names = &sampled.summary.names;
     let rows = names.len() as f64;
@@ -183,7 +183,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
 
 pub(super) const TRUTH: Stroke = Stroke::new(VERMILION, 1.0).dashed();
 
-/// The same over traces, where an ensemble has that colour.
+/// The pen of injected values over traces, where an ensemble has that colour.
 const INJECTED: Stroke = Stroke::new(BLACK, 1.0).dashed();
 
 /// Autocorrelation functions, and autocorrelation times over the length of the chain.
@@ -240,7 +240,7 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     figure
 }
 
-/// By what the chain counts as converged, and whether it does.
+/// The criterion of convergence, and whether the chain meets it.
 fn criterion(sampled: &Sampled) -> String {
     let Goals { rhat, ess } = sampled.goals;
     let verdict = if sampled.summary.converged { "Converged" } else { "Not converged" };
@@ -249,7 +249,7 @@ fn criterion(sampled: &Sampled) -> String {
 
 const DASHES: [&[f64]; 2] = [&[], &[1.0, 1.6]];
 
-/// The autocorrelation time of the first steps, for ever more of them.
+/// The autocorrelation time of the first steps, for an increasing number of them.
 fn growth(series: &Series, kept: usize) -> Vec<[f64; 2]> {
     let count = 12;
     let lengths = (0..=count).map(|k| (10.0 * (kept as f64 / 10.0).powf(k as f64 / count as f64)).round() as usize);
@@ -262,7 +262,7 @@ fn growth(series: &Series, kept: usize) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Range of draws that shows all but a thousandth to either side, with some room, within the bounds of the prior.
+/// Range of draws without a thousandth at either side, with a margin, within the bounds of the prior.
 pub(super) fn shown_range(draws: &[f64], bounds: [f64; 2], also: Option<f64>, scale: Scale) -> [f64; 2] {
     let mut sorted = draws.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);

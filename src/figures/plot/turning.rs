@@ -1,4 +1,4 @@
-//! The star as it turns: a map, or maps of several times, as a page's script draws them.
+//! The rotating star: a map, or maps of several times, as drawn by a page's script.
 
 use super::content::Content;
 use super::maps::Nights;
@@ -12,19 +12,19 @@ use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// Pixels of a map at most: finer ones are not seen.
+/// Largest number of pixels of a map: finer ones are invisible.
 const PIXELS: usize = 3000;
 
-/// Steps of the scale of colours.
+/// Steps of the colour scale.
 const STEPS: u32 = 100;
 
 /// The character of the first step: those that follow need no escape.
 const FIRST: u32 = 0xa1;
 
-/// Rotations that are shown one after the other; of more, one for each map.
+/// Rotations that are shown one after the other; beyond, one for each map.
 const ROTATIONS: f64 = 12.0;
 
-/// One of the maps: its time (d), where its longitudes count from (d), and what its pixels hold.
+/// One of the maps: its time (d), the origin of its longitudes (d), and the values of its pixels.
 struct At {
     time_d: f64,
     epoch_d: f64,
@@ -73,7 +73,7 @@ pub fn turning(folder: &Path) -> Result<Option<Value>, PlotError> {
     })))
 }
 
-/// Of a star that does not change, or of one that does not change within a season.
+/// For a static star, or one that is static within a season.
 fn of_static(file: &MapFile) -> (Vec<At>, Scale) {
     let of = |columns: &MapColumns| {
         let values = match columns {
@@ -98,7 +98,7 @@ fn of_static(file: &MapFile) -> (Vec<At>, Scale) {
     (maps, scale)
 }
 
-/// From when to when (d) the star is shown: all the time, or a rotation for each map.
+/// The time ranges (d) in which the star is shown: the total time, or a rotation for each map.
 fn spans(times_d: &[f64], period_d: f64) -> Vec<[f64; 2]> {
     let (first, last) = (times_d[0], times_d[times_d.len() - 1]);
     match last - first {

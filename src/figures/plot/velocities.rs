@@ -1,5 +1,5 @@
-//! Radial velocities: first moments with the spots in them, and what is left when these are taken out; over time and
-//! folded with the orbit.
+//! Radial velocities: first moments including the spots, and the residuals after subtracting them; as functions of time
+//! and folded with the orbit.
 
 use super::ephemeris::ephemeris;
 use super::symbols::decimals;
@@ -18,10 +18,10 @@ use crate::runs::origin;
 use crate::star::{Eccentric, Motion, Orbit};
 use std::path::Path;
 
-/// The table of velocities that `map` and `periodogram` write.
+/// The table of velocities by `map` and `periodogram`.
 pub(super) const FILE: &str = "rv.csv";
 
-/// The covariance of those of `periodogram`, a row a profile.
+/// The covariance of those by `periodogram`, one row per profile.
 const COVARIANCE: &str = "covariance.csv";
 
 /// Velocities (km/s) with their error bars, or without where these are missing.
@@ -37,25 +37,25 @@ struct Series<'a> {
 struct Curves<'a> {
     time_d: &'a [f64],
     cycle: &'a [f64],
-    /// First moments, with the spots in them.
+    /// First moments, including the spots.
     moments: Vec<Series<'a>>,
     /// Without spots.
     clean: Series<'a>,
-    /// Without the orbit, too.
+    /// Also without the orbit.
     residual: Series<'a>,
     motion: Motion,
     vsys_kms: f64,
     /// Rotation period of the star (d).
     rotation_period_d: f64,
-    /// Errors of K (km/s) and of the period over that of rotation, where they are known.
+    /// Uncertainties of K (km/s) and of the period over that of rotation, where they are known.
     sigma: [Option<f64>; 2],
-    /// What the orbit is called.
+    /// Description of the orbit.
     orbit_is: &'static str,
-    /// Profiles whose errors are enlarged, from 0.
+    /// Profiles with enlarged uncertainties, from 0.
     events: Vec<usize>,
 }
 
-/// The velocities of maps: marginalised over maps, or with the model's spots taken out.
+/// The velocities of maps: marginalised over maps, or with the model's spots subtracted.
 pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     let fit: FitFile = origin::read(folder, FIT)?;
@@ -109,7 +109,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     Ok(figure)
 }
 
-/// The velocities of a blind search, with the orbit that it found.
+/// The velocities of a blind search, with its orbit.
 pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure, PlotError> {
     let OrbitRecord { k_kms, sigma_k_kms, porb_over_prot, sigma_porb_over_prot, phi, period_d, .. } = file.best;
     // planets of known ephemeris, or the best orbit
@@ -132,7 +132,7 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
     let cycle = table.column_within("cycle", ANY)?;
     let clean = series("observed", "", "rv_kms", "rv_sigma_kms", POINT)?;
     let orbit: Vec<f64> = cycle.iter().map(|cycle| motion.velocity_kms(*cycle)).collect();
-    // velocities count from a systemic velocity that is found; from a given one, all may be off alike
+    // velocities are relative to a fitted systemic velocity; with a given one, all may have a common offset
     let offset_kms = match (file.systemic_velocity, &file.offset) {
         (None, Some(_)) => clean.less(&orbit).mean(),
         _ => 0.0,
@@ -174,7 +174,7 @@ pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure,
     Ok(figure)
 }
 
-/// Which of so many profiles have enlarged errors, from 0.
+/// The profiles with enlarged uncertainties among so many, from 0.
 fn events(provenance: &Provenance, profiles: usize) -> Vec<usize> {
     let events = provenance.measured.events.iter().flat_map(|events| &events.profiles);
     (0..profiles).filter(|k| events.clone().any(|event| event.profile == k + 1)).collect()
@@ -185,11 +185,11 @@ const MODEL: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Diamond, 
 const EVENT: (Marker, f64, crate::figures::drawing::Colour) = (Marker::Ring, 6.5, PURPLE);
 const ORBIT: Stroke = Stroke::new(BLUE, 1.0);
 
-/// Panels on the left: heights of first moments, velocities without spots, and residuals, as shares.
+/// Panels on the left: heights of first moments, velocities without spots, and residuals, as fractions.
 const ROWS: [f64; 3] = [1.0, 1.3, 0.8];
 
 impl Curves<'_> {
-    /// Whether there is an orbit to fold with.
+    /// Whether there is an orbit for folding.
     fn folds(&self) -> bool {
         let Orbit { k_kms, porb_over_prot, .. } = self.motion.first.orbit;
         k_kms > 0.0 && porb_over_prot > 0.0
@@ -276,7 +276,7 @@ impl Curves<'_> {
         series[0].only(&here).ring(figure, panel, &times, unit);
     }
 
-    /// What rings are, for the caption.
+    /// The description of the rings in the caption.
     fn of_events(&self) -> &'static str {
         match self.events.is_empty() {
             true => "",
@@ -297,7 +297,7 @@ impl Curves<'_> {
         Axis::linear("", part.range_d.map(|time| self.cycle_at(time)))
     }
 
-    /// Velocities without spots, and what the orbit leaves of them, over the orbital phase.
+    /// Velocities without spots, and their residuals from the orbit, as functions of orbital phase.
     fn fold(&self, figure: &mut Figure, [above, below]: [Rect; 2], unit: Speeds) {
         let Motion { first, second } = self.motion;
         let Orbit { k_kms, porb_over_prot, phi } = first.orbit;
@@ -309,7 +309,7 @@ impl Curves<'_> {
         let alone = self.clean.less(&others);
         let panel =
             Panel { frame: above, x: x.clone(), y: unit.axis("spot-corrected RV", range(&[&alone], self.vsys_kms)) };
-        // counted from the largest velocity
+        // relative to the largest velocity
         let orbit = Eccentric { orbit: Orbit { porb_over_prot: 1.0, phi: 0.0, ..first.orbit }, ..first };
         let rv = |phase: f64| unit.factor * (self.vsys_kms + orbit.velocity_kms(phase));
         let curve: Vec<[f64; 2]> = (0..=200).map(|i| f64::from(i) / 200.0).map(|t| [t, rv(t)]).collect();
@@ -337,11 +337,12 @@ impl Curves<'_> {
     }
 }
 
-/// Room above the highest end of an error bar and below the lowest, as a share of half the range: that of a legend.
+/// Margin above the highest end of an error bar and below the lowest, as a fraction of half the range: space for a
+/// legend.
 const MARGIN: f64 = 0.25;
 
-/// All error bars, with as much above `middle` as below it, so that a panel shows what is not centred there; above and
-/// below their own mean where they are all to one side of it.
+/// All error bars, with the same range above and below `middle`, so that a panel shows offsets from it; above and below
+/// their mean where they are all to one side of it.
 fn range(series: &[&Series], middle: f64) -> [f64; 2] {
     let ends = series.iter().flat_map(|one| {
         let sigma = |k: usize| one.sigma.get(k).copied().unwrap_or(0.0);
@@ -367,12 +368,12 @@ impl<'a> Series<'a> {
         Series { y, sigma: self.sigma.clone(), ..*self }
     }
 
-    /// Their mean (km/s), 0 of none.
+    /// Their mean (km/s), 0 for none.
     fn mean(&self) -> f64 {
         self.y.iter().sum::<f64>() / self.y.len().max(1) as f64
     }
 
-    /// Some of them.
+    /// A subset of them.
     fn only(&self, these: &[usize]) -> Series<'a> {
         let of = |all: &[f64]| these.iter().filter_map(|k| all.get(*k).copied()).collect();
         Series { y: of(&self.y), sigma: of(&self.sigma), ..*self }

@@ -1,4 +1,4 @@
-//! What a result assumes: fixed values, priors, and what was measured on the observations.
+//! The assumptions of a result: fixed values, priors, and quantities measured from the observations.
 
 use super::chapter::{Table, table};
 use crate::figures::plot::symbols::label;
@@ -6,7 +6,7 @@ use crate::model::Parameter;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Keys of a config with what they are called, and units.
+/// Keys of a config with their names and units.
 const KEYS: [(&str, &str, &str); 25] = [
     ("/star/rotation_period_d", "rotation period", "d"),
     ("/star/epoch_d", "epoch of rotation phase 0", "d"),
@@ -35,7 +35,7 @@ const KEYS: [(&str, &str, &str); 25] = [
     ("/imaging/spot_lifetime_d", "spot lifetime", "d"),
 ];
 
-/// Keys that matter to static maps alone.
+/// Keys that only static maps use.
 const STATIC: [&str; 1] = ["/imaging/chi2_target"];
 
 /// Values that are held fixed.
@@ -54,7 +54,7 @@ pub(super) fn fixed(config: &Value) -> Table {
     Table { head: Vec::new(), rows: KEYS.iter().filter_map(row).collect() }
 }
 
-/// Priors of what is free.
+/// Priors of the free parameters.
 pub(super) fn priors(config: &Value) -> Table {
     let of = |(name, prior): (&String, &Value)| {
         let kind = prior.get("prior").map(written).unwrap_or_default();
@@ -127,7 +127,7 @@ fn written(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Array(list) => list.iter().map(written).collect::<Vec<_>>().join(", "),
-        // numbers that are long by a rounding error alone are not worth their digits
+        // numbers that are long only by a rounding error are shortened
         Value::Number(number) => match number.as_f64() {
             Some(x) if number.to_string().len() > 12 => {
                 format!("{:.6}", x).trim_end_matches('0').trim_end_matches('.').into()

@@ -1,4 +1,4 @@
-//! What is said of one kind of result: sentences and tables of text.
+//! The text on one kind of result: sentences and tables.
 
 use crate::figures::plot::symbols::label;
 use crate::model::{Parameter, ParameterValues};
@@ -8,12 +8,12 @@ use crate::model::{Parameter, ParameterValues};
 pub struct Table {
     /// Names of the columns.
     pub head: Vec<String>,
-    /// The rows, as long as the head.
+    /// The rows, with as many cells as the head.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// The same without columns that say nothing in any row.
+    /// The same without columns that are empty in all rows.
     pub fn without_empty_columns(&self) -> Table {
         let says = |k: &usize| self.rows.iter().any(|row| row.get(*k).is_some_and(|cell| !is_empty(cell)));
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
@@ -23,44 +23,44 @@ impl Table {
     }
 }
 
-/// What stands in a cell for which there is no number.
+/// The text of a cell without a number.
 pub(super) const NOTHING: &str = "–";
 
 fn is_empty(cell: &str) -> bool {
     cell.is_empty() || cell == NOTHING
 }
 
-/// How a sentence is meant, for the colour that it has.
+/// The meaning of a sentence, for its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
-    /// It can be relied on.
+    /// Reliable.
     Good,
-    /// It is neither good nor bad.
+    /// Neutral.
     #[default]
     Neutral,
-    /// It is to be doubted.
+    /// Doubtful.
     Doubt,
 }
 
-/// What is said of one kind of result.
+/// The text on one kind of result.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chapter {
     /// Its heading.
     pub heading: String,
-    /// What it comes to, a sentence each, the one that heads the result first.
+    /// Its conclusions, one sentence each, the main one first.
     pub verdicts: Vec<(Tone, String)>,
-    /// What speaks against it, or must be known beside it.
+    /// Caveats and warnings.
     pub warnings: Vec<String>,
-    /// What helps to read it.
+    /// Notes for reading it.
     pub notes: Vec<String>,
-    /// Tables, each with a line above it.
+    /// Tables, each with a caption.
     pub tables: Vec<(String, Table)>,
-    /// Tables that say how well a sampler did, which are folded away.
+    /// Tables on the performance of a sampler, which are folded.
     pub diagnostics: Vec<(String, Table)>,
 }
 
 impl Chapter {
-    /// The verdicts with the tones that they are shown in: nothing is good beside a warning.
+    /// The verdicts with their displayed tones: none is good in the presence of a warning.
     pub fn shown_verdicts(&self) -> impl Iterator<Item = (Tone, &str)> {
         let doubted = !self.warnings.is_empty() || self.verdicts.iter().any(|(tone, _)| *tone == Tone::Doubt);
         self.verdicts.iter().map(move |(tone, sentence)| match tone {
@@ -75,7 +75,7 @@ pub(super) fn number(value: impl Into<Option<f64>>, digits: usize) -> String {
     value.into().filter(|x| x.is_finite()).map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"))
 }
 
-/// A table of names and values, those without one left out.
+/// A table of names and values, without empty values.
 pub(super) fn pairs(rows: &[(&str, String)]) -> Table {
     let told = rows.iter().filter(|(_, value)| !is_empty(value));
     Table { head: Vec::new(), rows: told.map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
@@ -86,12 +86,12 @@ pub(super) fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
     Table { head: head.iter().map(|text| (*text).to_owned()).collect(), rows }
 }
 
-/// That of a sentence which is good, or else to be doubted.
+/// The tone of a sentence, good or doubtful.
 pub(super) fn tone(good: bool) -> Tone {
     if good { Tone::Good } else { Tone::Doubt }
 }
 
-/// The parameters that are given, and the injected ones where they are known.
+/// The given parameters, and the injected ones if they are known.
 pub(super) fn parameters(
     values: &ParameterValues,
     truth: Option<&ParameterValues>,

@@ -1,4 +1,4 @@
-//! What is said of each kind of result, from its file.
+//! The text on each kind of result, from its file.
 
 use super::chapter::{Chapter, NOTHING, Tone, number, pairs, parameters, table, tone};
 use super::{injection, maps, planned, run, verdicts};
@@ -19,7 +19,7 @@ use crate::sampling::landscape::Axis;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The chapter of the result that is known by `file`.
+/// The chapter of the result identified by `file`.
 pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError> {
     Ok(match file {
         manifest::FILE => run::chapter(folder)?,
@@ -38,12 +38,12 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError
             TruthFile::Injected(truth) => injection::injection(&truth),
             TruthFile::Simulated(truth) => simulation(&truth),
         },
-        // figures and no more
+        // only figures
         _ => Chapter::default(),
     })
 }
 
-/// Decimals that show an error, where there is one.
+/// Decimals for an uncertainty, if there is one.
 fn digits_of(sigma: Option<f64>, otherwise: usize) -> usize {
     sigma.filter(|x| x.is_finite()).map_or(otherwise, decimals)
 }
@@ -117,7 +117,7 @@ fn search(file: &PeriodogramFile) -> Chapter {
     }
 }
 
-/// What a name means, where it has to be said.
+/// The description of a name, if it needs one.
 fn note(name: &str, meaning: Option<&str>) -> Option<String> {
     Some(format!("{}: {}.", symbol(name).0, meaning?))
 }
@@ -139,7 +139,7 @@ fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
             number(truth.and_then(|truth| truth.get(&axis.name)).copied(), digits),
         ]
     };
-    // an axis of a phase that goes once around is as long as that
+    // an axis that covers all phases has the length of a cycle
     let length = |axis: &Axis| if axis.max > axis.min { axis.max - axis.min } else { axis.max - axis.min + 1.0 };
     let unbounded = axes.iter().find(|axis| estimate(axis).is_some_and(|one| one.error > 0.5 * length(axis)));
     let verdict = match (file.map(|file| &file.refused), unbounded) {

@@ -1,4 +1,4 @@
-//! How to cite: from the CITATION.cff that the program was built with.
+//! The citation, from the CITATION.cff at the build of the program.
 
 /// The file.
 const CITATION: &str = include_str!("../../../CITATION.cff");
@@ -18,7 +18,7 @@ pub(super) fn program() -> (&'static str, &'static str) {
     )
 }
 
-/// The paper whose method it is: authors, title, journal and DOI.
+/// The paper on the method: authors, title, journal and DOI.
 pub(super) fn paper() -> Paper {
     let get = |key| value("references:", key).unwrap_or_default();
     Paper { title: get("title"), journal: get("journal"), volume: get("volume"), start: get("start"), doi: get("doi") }

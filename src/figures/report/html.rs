@@ -9,10 +9,10 @@ use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("style.css");
 
-/// What every page begins with.
+/// The beginning of every page.
 pub(super) const BEGINNING: &str = "<!doctype html>\n";
 
-/// Points in the width of a column, and some: figures that are not wider fit a phone.
+/// Slightly more than the width of a column in points: figures up to this width fit a phone.
 const NARROW_PT: f64 = 1.3 * COLUMN_MM * 72.0 / 25.4;
 
 /// The page.
@@ -21,26 +21,26 @@ pub(super) struct Page {
     /// Name of the star.
     pub title: String,
     pub subtitle: String,
-    /// Star and data, label and text a line.
+    /// Star and data, one label and text per line.
     pub subject: Vec<(String, String)>,
-    /// The maps that the script turns.
+    /// The maps that the script rotates.
     pub turning: Option<Value>,
-    /// What the results come to.
+    /// The conclusions of the results.
     pub statements: Vec<Statement>,
-    /// What speaks against it, or must be known beside it.
+    /// Caveats and warnings.
     pub warnings: Vec<String>,
     pub sections: Vec<Section>,
-    /// What was assumed: tables, each with a line above it.
+    /// The assumptions: tables, each with a caption.
     pub assumed: Vec<(String, Table)>,
-    /// What was measured on the observations before.
+    /// Quantities measured from the observations beforehand.
     pub measured: Vec<String>,
-    /// The config with all defaults filled in, where a file has it.
+    /// The config with all defaults filled in, if a file contains it.
     pub config: Option<Value>,
-    /// Version of the program and fingerprint of the data, where a file has them.
+    /// Version of the program and fingerprint of the data, if a file contains them.
     pub provenance: Vec<(String, String)>,
 }
 
-/// What a result comes to, in a sentence.
+/// The conclusion of a result, in one sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Statement {
     pub kind: Kind,
@@ -93,7 +93,7 @@ pub(super) fn page(page: &Page) -> String {
     html + "</body>\n</html>\n"
 }
 
-/// The star that turns.
+/// The rotating star.
 const STAR: &str = "<div class=\"star\">\n<canvas id=\"star\" width=\"260\" height=\"260\" role=\"img\" \
 aria-label=\"The star as it turns, with the spots of the map\"></canvas>\n<p><button id=\"star-play\" \
 type=\"button\">Turn</button> <input id=\"star-time\" type=\"range\" min=\"0\" max=\"1000\" step=\"any\" value=\"0\" \
@@ -150,7 +150,7 @@ fn assumed(html: &mut String, page: &Page) {
     html.push_str("</section>\n");
 }
 
-/// Those that say something.
+/// The tables that are not empty.
 fn tables(html: &mut String, tables: &[(String, Table)]) {
     for (caption, one) in tables {
         let filled = one.without_empty_columns();
@@ -222,7 +222,7 @@ fn footer(html: &mut String, page: &Page) {
     html.push_str("</footer>\n");
 }
 
-/// Control characters but the line feed, which HTML does not know, are written as escapes.
+/// Escapes text, and control characters except the line feed, which HTML does not allow.
 fn escape(text: &str) -> String {
     let is_odd = |c: char| c.is_control() && c != '\n';
     let shown = |c: char| if is_odd(c) { c.escape_default().to_string() } else { c.to_string() };
@@ -230,9 +230,9 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The markup of figures as HTML: `*italic*`, `_{subscript}`, `^{superscript}`; and what is between backticks as code.
+/// The markup of figures as HTML: `*italic*`, `_{subscript}`, `^{superscript}`; and text between backticks as code.
 fn markup(text: &str) -> String {
-    // a lone star or brace is a character like any other
+    // an unpaired star or brace is an ordinary character
     if text.matches('*').count() % 2 == 1 {
         return escape(&plain(text));
     }

@@ -7,10 +7,10 @@ use crate::planets::speeds::Speeds;
 use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;
 
-/// Periods in the table, at most.
+/// Largest number of periods in the table.
 const SHOWN: usize = 20;
 
-/// Of `truth.json` beside profiles with an orbit put in.
+/// For `truth.json` with profiles that have an injected orbit.
 pub(super) fn injection(truth: &InjectedTruth) -> Chapter {
     let Orbit { k_kms, porb_over_prot, phi } = truth.injected;
     let rows = [("*K* (km/s)", k_kms), ("*P*_{orb}/*P*_{rot}", porb_over_prot), ("phase", phi)];
@@ -22,7 +22,7 @@ pub(super) fn injection(truth: &InjectedTruth) -> Chapter {
     }
 }
 
-/// Of `limits.json`.
+/// For `limits.json`.
 pub(super) fn limits(file: &LimitsFile) -> Chapter {
     let unit = Speeds::of(&file.k_kms);
     let row = |limit: &Limit| {

@@ -1,4 +1,4 @@
-//! What a report has on the maps of a star.
+//! The part of a report on the maps of a star.
 
 use super::chapter::{Chapter, Tone, number, pairs, parameters, tone};
 use crate::data::io::map::FitFile;
@@ -7,7 +7,7 @@ use crate::sampling::log_density::Status;
 use crate::surface::SpotField;
 use crate::surface::maps::ImageSummary;
 
-/// Of the whole result.
+/// For the whole result.
 pub(super) fn chapter(file: &FitFile) -> Chapter {
     let fit = &file.summary;
     let mut rows = file.field.as_ref().map_or_else(Vec::new, of_field);

@@ -1,6 +1,6 @@
-//! One page of a star: the verdict and what speaks against it, then velocities, dynamic spectra, maps, periodogram,
-//! posterior and limits, as far as folders hold them; what was assumed, and how to cite. A single HTML file that needs
-//! nothing else: no network, figures as SVG within it, and a script that turns the star where there is a map.
+//! One page per star: the verdict with its caveats, then velocities, dynamic spectra, maps, periodogram, posterior and
+//! limits, if folders contain them; the assumptions, and the citation. A self-contained HTML file: no network, figures
+//! as SVG within it, and a script that rotates the star if there is a map.
 
 mod assumed;
 mod chapter;
@@ -27,10 +27,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use subject::About;
 
-/// What one folder holds.
+/// The content of one folder.
 struct Part<'a> {
     folder: &'a Path,
-    /// The folder's own name.
+    /// The name of the folder.
     title: String,
     chapters: Vec<(Kind, Chapter)>,
     abouts: Vec<About>,
@@ -52,7 +52,7 @@ impl<'a> Part<'a> {
         self.abouts.iter().find_map(|about| about.config.as_ref())
     }
 
-    /// The name that the config gives the star.
+    /// The name of the star in the config.
     fn star_name(&self) -> Option<&str> {
         subject::given_name(self.config()?)
     }
@@ -62,10 +62,10 @@ impl<'a> Part<'a> {
     }
 }
 
-/// The page of a star of what `folders` hold, as HTML.
+/// The page of a star from the results in `folders`, as HTML.
 ///
 /// # Errors
-/// [`PlotError`]: a folder that is not there or holds nothing that is known, files that are wrong, folders of different
+/// [`PlotError`]: a folder that does not exist or has no known results, files that are wrong, folders of different
 /// stars.
 pub fn report(folders: &[PathBuf]) -> Result<String, PlotError> {
     let parts = folders.iter().map(|folder| Part::read(folder)).collect::<Result<Vec<Part>, PlotError>>()?;
@@ -76,7 +76,7 @@ pub fn report(folders: &[PathBuf]) -> Result<String, PlotError> {
     Ok(html::page(&page(parts, turning)))
 }
 
-/// Refuses two folders that are of different stars, and one that is there twice.
+/// Refuses two folders of different stars, and a folder given twice.
 fn same_star(first: &Part, other: &Part) -> Result<(), PlotError> {
     let refuse = |problem: String| Err(PlotError::Content { path: other.folder.to_owned(), problem });
     let folder = first.folder.display();
@@ -94,7 +94,7 @@ fn same_star(first: &Part, other: &Part) -> Result<(), PlotError> {
     }
 }
 
-/// What warns of the results, but for a planet that maps show where a search says what it is.
+/// Warnings on the results, except for a planet signal in maps that a search has explained.
 fn warnings(parts: &[Part]) -> Vec<String> {
     let chapters = || parts.iter().flat_map(|part| &part.chapters);
     let is_searched = chapters().any(|(kind, _)| *kind == Kind::Periodogram);
@@ -102,7 +102,7 @@ fn warnings(parts: &[Part]) -> Vec<String> {
     unique(chapters().flat_map(|(_, chapter)| &chapter.warnings).filter(is_open).cloned())
 }
 
-/// All that the page shows, of the parts of one star.
+/// The content of the page, from the parts of one star.
 fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
     let config = parts.iter().find_map(Part::config).cloned();
     let named = parts.iter().find_map(Part::star_name).map(str::to_owned);
@@ -151,7 +151,7 @@ fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
     }
 }
 
-/// What all results come to: searches first, and no sentence twice.
+/// The conclusions of all results: searches first, and no sentence twice.
 fn statements(parts: &[Part]) -> Vec<Statement> {
     let mut all: Vec<&(Kind, Chapter)> = parts.iter().flat_map(|part| &part.chapters).collect();
     all.sort_by_key(|(kind, _)| kind.rank());
@@ -177,14 +177,14 @@ fn unique(lines: impl Iterator<Item = String>) -> Vec<String> {
     found
 }
 
-/// Whether the file begins as a page does.
+/// Whether the file begins like a page.
 pub fn is_page(file: &Path) -> bool {
     let mut beginning = vec![0; html::BEGINNING.len()];
     let read = std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut beginning));
     read.is_ok() && beginning == html::BEGINNING.as_bytes()
 }
 
-/// The folder's own name.
+/// The name of the folder.
 fn title(folder: &Path) -> String {
     let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     escaped(&whole.file_name().unwrap_or(folder.as_os_str()).to_string_lossy()).into_owned()

@@ -1,4 +1,4 @@
-//! What is said of a campaign that is planned.
+//! The text on a planned campaign.
 
 use super::chapter::{Chapter, Table, Tone, number};
 use crate::runs::plan::{AfterRecord, ExpectedRecord, PlanFile, ScheduleRecord};
@@ -6,7 +6,7 @@ use crate::runs::plan::{AfterRecord, ExpectedRecord, PlanFile, ScheduleRecord};
 /// Decimals of velocities (km/s).
 const DIGITS: usize = 4;
 
-/// Of `plan.json`.
+/// For `plan.json`.
 pub(super) fn chapter(file: &PlanFile) -> Chapter {
     let best = file.best();
     let sentences = best.sentences(file.false_alarm_probability);

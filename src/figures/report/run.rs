@@ -1,4 +1,4 @@
-//! What is said of a run.
+//! The text on a run.
 
 use super::chapter::{Chapter, NOTHING, Table, Tone, number};
 use super::verdicts;
@@ -97,7 +97,7 @@ fn injected(name: &str, one: &ParameterSummary, value: Option<&f64>) -> String {
     number(value.map(|value| shown.factor * value), decimals(shown.factor * one.sd))
 }
 
-/// How well the chain tells each parameter.
+/// The convergence of each parameter.
 fn convergence_of(summary: &Summary) -> Table {
     let optional = |x: Option<f64>, digits: usize| x.map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"));
     let row = |(name, one): (&String, &ParameterSummary)| {
@@ -109,7 +109,7 @@ fn convergence_of(summary: &Summary) -> Table {
     Table { head, rows: sampled.chain(derived).map(row).collect() }
 }
 
-/// What the blind search and the chain say against it, and what else must be known beside the verdict.
+/// Caveats from the blind search and the chain, and other warnings on the verdict.
 fn warnings(manifest: &Manifest, summary: &RunSummary) -> Vec<String> {
     let measured = measured(manifest);
     let begun = manifest.warnings().into_iter().filter(|line| !measured.contains(line));
@@ -117,16 +117,16 @@ fn warnings(manifest: &Manifest, summary: &RunSummary) -> Vec<String> {
     all.filter(|line| !line.starts_with(BAYES)).collect()
 }
 
-/// How the line with Bayes factors begins, which is no warning.
+/// The beginning of the line with Bayes factors, which is no warning.
 const BAYES: &str = "ln Bayes factor";
 
-/// What was taken from the observations, one line each.
+/// Quantities measured from the observations, one line each.
 fn measured(manifest: &Manifest) -> Vec<String> {
     let lines = manifest.origin.measured.lines();
     lines.into_iter().map(|(label, text)| format!("{label}: {text}")).collect()
 }
 
-/// The modes of the period, where there are several or spots may make the one.
+/// The modes of the period, where there are several or spots may mimic the only one.
 fn period_modes(manifest: &Manifest, summary: &RunSummary) -> Table {
     if !summary.has_modes_to_show() {
         return Table::default();
@@ -152,7 +152,7 @@ fn period_modes(manifest: &Manifest, summary: &RunSummary) -> Table {
     Table { head: head.map(String::from).to_vec(), rows: summary.period_modes.iter().map(row).collect() }
 }
 
-/// Whether the chain has converged, and what that means.
+/// Whether the chain has converged, with the consequence.
 fn convergence(summary: &Summary) -> (Tone, String) {
     if !summary.converged {
         let advice = summary.advice.join("; ");
@@ -166,7 +166,7 @@ fn convergence(summary: &Summary) -> (Tone, String) {
     (if summary.advice.is_empty() { Tone::Good } else { Tone::Neutral }, sentence)
 }
 
-/// What parameters and quantities are, where their names do not say it.
+/// Descriptions of parameters and quantities, where their names are not sufficient.
 fn meanings(summary: &Summary) -> impl Iterator<Item = String> {
     let names = summary.names.iter().chain(&summary.derived_names);
     names.filter_map(|name| Some(format!("{}: {}.", symbol(name).0, summary.definitions.get(name)?)))

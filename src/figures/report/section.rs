@@ -1,4 +1,4 @@
-//! Sections of the page, in the order in which a reader asks: each with its figures, notes and tables.
+//! Sections of the page, in the order of a reader's questions: each with its figures, notes and tables.
 
 use super::chapter::{Chapter, Table};
 use super::{Part, unique};
@@ -7,7 +7,7 @@ use crate::data::io::truth;
 use crate::figures::drawing::Figure;
 use crate::runs::{blind_search, comparison, grid_scan, limits, manifest, optimum, plan};
 
-/// What a section is about.
+/// The subject of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Velocities,
@@ -41,7 +41,7 @@ impl Kind {
         Kind::Simulation,
     ];
 
-    /// Its name in addresses, and its heading.
+    /// Its anchor, and its heading.
     pub fn names(self) -> (&'static str, &'static str) {
         match self {
             Kind::Velocities => ("velocities", "Radial velocities"),
@@ -59,14 +59,14 @@ impl Kind {
         }
     }
 
-    /// Where its sentences stand among those of others: what is said of a planet first.
+    /// The rank of its sentences among all: those on a planet first.
     pub fn rank(self) -> usize {
         const FIRST: [Kind; 4] = [Kind::Periodogram, Kind::Posterior, Kind::Optimum, Kind::Limits];
         let place = |all: &[Kind]| all.iter().position(|kind| *kind == self);
         place(&FIRST).or_else(|| Some(FIRST.len() + place(&Kind::ALL)?)).unwrap_or(usize::MAX)
     }
 
-    /// Of the file by which a result is known.
+    /// For the file that identifies a result.
     pub fn of_file(file: &str) -> Kind {
         match file {
             MAP => Kind::Maps,
@@ -82,7 +82,7 @@ impl Kind {
         }
     }
 
-    /// Of a figure by its name; `true` where it is folded away.
+    /// For a figure by its name; `true` where it is folded.
     fn of_figure(name: &str) -> (Kind, bool) {
         let stem = name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('_');
         match stem {
@@ -103,7 +103,7 @@ impl Kind {
         }
     }
 
-    /// What folded figures and tables are called.
+    /// The title of folded figures and tables.
     fn folded_is(self) -> &'static str {
         match self {
             Kind::Velocities => "Velocities of the maps",
@@ -122,12 +122,12 @@ pub(super) struct Section {
     pub kind: Kind,
     pub figures: Vec<Figure>,
     pub notes: Vec<String>,
-    /// Tables, each with a line above it.
+    /// Tables, each with a caption.
     pub tables: Vec<(String, Table)>,
     pub folded: Folded,
 }
 
-/// What is shown on request alone.
+/// Content that is shown on request only.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Folded {
     pub summary: &'static str,
@@ -135,10 +135,10 @@ pub(super) struct Folded {
     pub tables: Vec<(String, Table)>,
 }
 
-/// The sections that the parts fill.
+/// The sections with content from the parts.
 pub(super) fn sections(parts: Vec<Part>) -> Vec<Section> {
     let several = |kind: Kind| parts.iter().flat_map(|part| &part.chapters).filter(|(of, _)| *of == kind).count() > 1;
-    // velocities of a search say more than those of maps, whose orbit is assumed
+    // velocities of a search are more informative than those of maps, whose orbit is assumed
     let is_searched = parts.iter().any(|part| part.chapters.iter().any(|(kind, _)| *kind == Kind::Periodogram));
     let mut sections: Vec<Section> = Kind::ALL
         .into_iter()
@@ -176,7 +176,7 @@ pub(super) fn sections(parts: Vec<Part>) -> Vec<Section> {
         for mut figure in part.figures {
             let (kind, mut is_folded) = Kind::of_figure(&figure.name);
             is_folded |= kind == Kind::Velocities && is_map && is_searched;
-            // names are addresses within the page
+            // names are anchors within the page
             while names.contains(&figure.name) {
                 figure.name.push_str("_2");
             }
@@ -188,9 +188,9 @@ pub(super) fn sections(parts: Vec<Part>) -> Vec<Section> {
         }
     }
     for section in &mut sections {
-        // what was observed, before what a static map makes of it
+        // observations before the residuals of a static map
         section.figures.sort_by_key(|figure| figure.name.starts_with("changes"));
-        // nothing is hidden behind nothing
+        // a section without other content is not folded
         let is_bare = section.figures.is_empty() && section.tables.is_empty();
         if is_bare {
             section.figures.append(&mut section.folded.figures);

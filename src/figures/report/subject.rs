@@ -1,4 +1,4 @@
-//! What a page is about: the star, and the data in number and time.
+//! The subject of a page: the star, and the number and times of the data.
 
 use crate::data::io::csv::Columns;
 use crate::data::io::lsd;
@@ -12,7 +12,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
 
-/// What all results say of where they came from, as far as they do.
+/// The provenance that results have in common.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct About {
@@ -23,18 +23,18 @@ pub(super) struct About {
     pub data_sha256: Option<String>,
     profiles: Option<usize>,
     time_span_d: Option<[f64; 2]>,
-    /// What the config leaves to the observations.
+    /// Quantities measured from the observations.
     pub measured: Measured,
 }
 
 impl Saved for About {}
 
 impl About {
-    /// Of the result in `folder` that is known by `file`.
+    /// For the result in `folder` identified by `file`.
     pub fn read(folder: &Path, file: &'static str) -> Result<Self, PlotError> {
         Ok(match file {
             MAP => origin::read(folder, FIT)?,
-            // tables say nothing
+            // tables have no provenance
             file if !file.ends_with(".json") => About::default(),
             file => origin::read(folder, file)?,
         })
@@ -47,7 +47,7 @@ impl About {
     }
 }
 
-/// Star and data of the result in `folder`. Empty for files that say nothing of a star.
+/// Star and data of the result in `folder`. Empty for files without a star.
 pub(super) fn lines(folder: &Path, about: &About) -> Vec<(String, String)> {
     let config = about.config.as_ref().unwrap_or(&Value::Null);
     let star: Vec<String> = [
@@ -71,12 +71,12 @@ pub(super) fn lines(folder: &Path, about: &About) -> Vec<(String, String)> {
     lines
 }
 
-/// The name that a config gives its star.
+/// The name of the star in a config.
 pub(super) fn given_name(config: &Value) -> Option<&str> {
     config.pointer("/star/name")?.as_str()
 }
 
-/// Names of folders that say nothing of the star whose data or results they hold.
+/// Generic names of folders, which do not name the star.
 const GENERIC: [&str; 15] = [
     "data",
     "profiles",
@@ -95,8 +95,8 @@ const GENERIC: [&str; 15] = [
     ".",
 ];
 
-/// What a star without a name is called: by the folder of its profiles, or that of its results, unless these have
-/// names such as `data`; else by the result.
+/// The name for a star without one: that of the folder of its profiles, or of its results, unless these have names such
+/// as `data`; otherwise that of the result.
 pub(super) fn name_from_folders(config: &Value, folder: &Path) -> String {
     let says = |name: &&str| !name.is_empty() && !name.starts_with('.') && !GENERIC.contains(name);
     let of = |path: Option<&Path>| {
@@ -109,7 +109,7 @@ pub(super) fn name_from_folders(config: &Value, folder: &Path) -> String {
     escaped(&name).into_owned()
 }
 
-/// The profiles: how many, and from when to when (d).
+/// The profiles: number, first and last time (d).
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Data {
     profiles: usize,

@@ -1,9 +1,9 @@
-//! The sentences that head a result, as its file has them.
+//! The main sentences of a result, from its file.
 
 use super::chapter::Tone;
 use crate::planets::verdict::{Finding, Verdict};
 
-/// Of a verdict on a planet: a detection can be relied on, a candidate is to be doubted.
+/// For a verdict on a planet: a detection is reliable, a candidate doubtful.
 pub(super) fn of(verdict: &Verdict) -> (Tone, String) {
     let tone = match verdict.finding {
         Finding::Detection => Tone::Good,

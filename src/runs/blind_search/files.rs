@@ -56,13 +56,14 @@ impl BlindSearch<'_> {
         write_json(&folder.join(FILE), &PeriodogramFile::of(self))
     }
 
-    /// The table of what was found, and what the config leaves to the observations.
+    /// The table of results, and of quantities measured from the observations.
     pub fn table(&self) -> String {
         PeriodogramFile::of(self).printed()
     }
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
-    /// What profiles have in common, systemic velocity, RV offsets and drift, is taken out, and held in the covariance.
+    /// Velocities common to the profiles, systemic velocity, RV offsets and drift, are subtracted, and held in the
+    /// covariance.
     fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
         let held = &self.detection.last().held;
         let n = held.len();
@@ -89,7 +90,7 @@ impl BlindSearch<'_> {
         table
     }
 
-    /// That of the first search, with Delta ln L of the regularised likelihood beside it.
+    /// The periodogram of the first search, including Delta ln L of the regularised likelihood.
     fn first_periodogram(&self) -> Table {
         let found = &self.detection;
         let regularised = found.known.beside(&found.planet_free.regularised);
@@ -108,7 +109,7 @@ impl BlindSearch<'_> {
         table
     }
 
-    /// The numbers under [`COLUMNS`].
+    /// The values under [`COLUMNS`].
     fn rows<'a>(&self, search: &'a Search) -> impl Iterator<Item = Vec<f64>> + 'a {
         let rotation_period_d = self.scene.imager.star.rotation_period_d;
         search.rows.iter().map(move |row| {
@@ -126,7 +127,7 @@ impl BlindSearch<'_> {
     }
 }
 
-/// Rows of comma-separated numbers, without names above them.
+/// Rows of comma-separated numbers, without a header.
 fn matrix(m: &DMatrix<f64>) -> String {
     let row = |k: usize| m.row(k).iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
     (0..m.nrows()).map(row).collect()

@@ -1,11 +1,11 @@
-//! The blind search for a planet that every statement on one rests on: how often do stars without a planet show as
-//! much?
+//! The blind search for a planet, the basis of every statement on one: how often do stars without a planet show an
+//! equally high peak?
 //!
 //! In: a scene and [`BlindSearchOptions`]. Out: a [`BlindSearch`]. `periodogram` writes all of it ([`PeriodogramFile`]
-//! with its tables); an optimum or a chain takes a planet for granted, so that `optimise`, `sample` and `batch` hold
-//! its [`SearchSummary`], whose verdict heads theirs.
+//! with its tables); an optimum or a chain assumes a planet, so that `optimise`, `sample` and `batch` include its
+//! [`SearchSummary`], whose verdict precedes their results.
 //!
-//! `priors` is on orbits that a config does not allow.
+//! `priors` handles orbits that a config does not allow.
 
 mod files;
 mod options;

@@ -17,26 +17,26 @@ pub struct BlindSearchOptions {
     /// Whether a second planet is searched for.
     pub second_planet: bool,
     /// Whether systemic velocity and stellar parameters that are free in the config are held at its values, instead of
-    /// integrated out within their priors.
+    /// marginalised over within their priors.
     pub fixed: bool,
-    /// Number of stars without a planet that peaks are judged by.
+    /// Number of planet-free Monte Carlo realisations for the FAP.
     pub draws: usize,
-    /// Seed of these draws.
+    /// Seed of these realisations.
     pub seed: u64,
-    /// Of which orbits it is asked whether they depend on the target chi2 or on one night.
+    /// The orbits whose dependence on the target chi2 and on single nights is tested.
     pub robustness: RobustnessOf,
-    /// Whether a static map is compared with an evolving one, and nothing is judged where the star changes.
+    /// Whether a static map is compared with an evolving one, with no verdict where the spots evolve.
     pub static_check: bool,
 }
 
-/// Of which orbits it is asked whether they depend on a choice.
+/// The orbits whose robustness is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RobustnessOf {
-    /// Of the best orbit, whatever it is.
+    /// The best orbit, whatever it is.
     Any,
-    /// Of a candidate.
+    /// A candidate.
     Candidates,
-    /// Of none.
+    /// None.
     None,
 }
 
@@ -68,7 +68,7 @@ impl Default for BlindSearchOptions {
 }
 
 impl BlindSearchOptions {
-    /// For what goes on from the best orbit: `optimise`, `sample`, `batch`.
+    /// For commands that continue from the best orbit: `optimise`, `sample`, `batch`.
     pub(super) fn before_a_chain() -> Self {
         BlindSearchOptions { robustness: RobustnessOf::Candidates, ..Default::default() }
     }
@@ -76,13 +76,13 @@ impl BlindSearchOptions {
     /// The trial periods for the star in `scene`.
     ///
     /// # Errors
-    /// Periods that make no sense, too few profiles.
+    /// Invalid periods, too few profiles.
     #[doc(hidden)]
     pub fn frequencies(&self, scene: &Scene) -> Result<Frequencies, FrequencyError> {
         Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, self.periods)
     }
 
-    /// How the star in `scene` is searched.
+    /// The settings of the search of the star in `scene`.
     #[doc(hidden)]
     pub fn detection(&self, scene: &Scene) -> DetectionSettings {
         let surface = scene.surface();

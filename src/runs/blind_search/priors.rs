@@ -1,4 +1,4 @@
-//! What is said where the priors of a config do not allow the best orbit.
+//! The verdict where the priors of a config do not allow the best orbit.
 
 use crate::data::scene::Scene;
 use crate::inference::detection::Detection;
@@ -7,7 +7,8 @@ use crate::planets::periodogram::window::is_same_frequency;
 use crate::planets::periodogram::{CircularOrbit, Imitation, Row};
 use crate::planets::verdict::{Finding, Remark, Signal, Verdict, decimals, speed};
 
-/// The verdict on what the priors of `scene` allow; remarks on other orbits leave, and what they do not allow joins.
+/// The verdict on orbits that the priors of `scene` allow; remarks on other orbits are removed, and one on disallowed
+/// orbits is added.
 pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, remarks: &mut Vec<Remark>) -> Verdict {
     let periods = Periods::of(scene, found);
     if !periods.contain(found.best.porb_over_prot) {
@@ -50,7 +51,7 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
 enum Periods {
     /// Within a prior.
     Prior(Prior),
-    /// This one, to half the inverse time base.
+    /// This one, within half the inverse time base.
     At { porb_over_prot: f64, time_base_cycles: f64 },
 }
 
@@ -72,7 +73,8 @@ impl Periods {
     }
 }
 
-/// The verdict on the highest peak at `periods`, or else place, that is, by the chance of one as high at any period.
+/// The verdict on the highest peak at `periods`, or else on the highest point there, by the probability of one as high
+/// at any period.
 fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict {
     let rotation_period_d = found.frequencies.rotation_period_d;
     let peak = found.blind.peaks.iter().find(|peak| periods.contain(peak.porb_over_prot));

@@ -1,7 +1,7 @@
-//! What is usually quoted of an orbit that was found: times of the largest radial velocity and of inferior conjunction
-//! nearest to the middle of the data, and the minimum mass where the star's is known.
+//! Commonly quoted quantities of an orbit: times of the largest radial velocity and of inferior conjunction nearest to
+//! the middle of the data, and the minimum mass where the star's is known.
 //!
-//! Errors are to first order in K, period and phase; where the period has none, at that period.
+//! Uncertainties are to first order in K, period and phase; where the period has none, at that period.
 
 use crate::model::{Estimate, OrbitQuantities, OrbitQuantity, ParameterValues};
 use crate::planets::periodogram::KeplerianOrbit;
@@ -11,28 +11,28 @@ use crate::star::planet::minimum_mass;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// In a file.
+/// The quantities in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QuantitiesRecord {
     /// Time of the largest radial velocity (d).
     pub t_max_rv_d: Option<f64>,
-    /// Its error (d).
+    /// Its uncertainty (d).
     pub sigma_t_max_rv_d: Option<f64>,
     /// Time of inferior conjunction (d).
     pub t_conjunction_d: Option<f64>,
-    /// Its error (d).
+    /// Its uncertainty (d).
     pub sigma_t_conjunction_d: Option<f64>,
     /// Minimum mass (Jupiter masses), where the star's is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub msini_mjup: Option<f64>,
-    /// Its error (Jupiter masses).
+    /// Its uncertainty (Jupiter masses).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_msini_mjup: Option<f64>,
 }
 
 impl QuantitiesRecord {
     fn new([maximum, conjunction, mass]: [Option<Estimate>; 3]) -> Self {
-        // what is not a number comes of an orbit that is not bounded
+        // an unbounded orbit gives values that are not finite
         let value = |one: Option<Estimate>| one.map(|one| one.value).filter(|x| x.is_finite());
         let sigma = |one: Option<Estimate>| one.map(|one| one.sd).filter(|x| x.is_finite());
         QuantitiesRecord {
@@ -45,7 +45,7 @@ impl QuantitiesRecord {
         }
     }
 
-    /// Of a circular orbit.
+    /// For a circular orbit.
     pub(super) fn of_circle(peak: &Peak, quantities: &OrbitQuantities) -> Self {
         let found = peak.orbit;
         let orbit = Orbit { k_kms: found.k_kms, porb_over_prot: peak.porb_over_prot, phi: found.phi };
@@ -53,11 +53,11 @@ impl QuantitiesRecord {
         let covariance = peak.covariance.map_or(at_period, |c| [0, 1, 2].map(|i| [0, 1, 2].map(|j| c[(i, j)])));
         let all = [OrbitQuantity::Maximum, OrbitQuantity::Conjunction, OrbitQuantity::MinimumMass];
         let [maximum, conjunction, mass] = all.map(|quantity| quantities.estimate(quantity, &orbit, &covariance));
-        // K of a known planet may be below zero
+        // K of a known planet may be negative
         QuantitiesRecord::new([maximum, conjunction, mass.filter(|_| found.k_kms > 0.0)])
     }
 
-    /// Of an eccentric orbit; the error of the mass is that of `K sqrt(1 - e^2)`.
+    /// For an eccentric orbit; the uncertainty of the mass is that of `K sqrt(1 - e^2)`.
     pub(super) fn of_ellipse(orbit: &KeplerianOrbit, quantities: &OrbitQuantities) -> Self {
         let OrbitQuantities { rotation_period_d: prot, epoch_d, mass_msun, .. } = *quantities;
         let event = |cycle: f64, sigma: f64| Some(Estimate { value: epoch_d + prot * cycle, sd: prot * sigma });
@@ -72,7 +72,7 @@ impl QuantitiesRecord {
         ])
     }
 
-    /// The same of a planet that was injected, by name; times nearest to those found. Empty where there is none.
+    /// The same for an injected planet, by name; times nearest to those found. Empty where there is none.
     pub(super) fn injected(
         &self,
         truth: Option<ParameterValues>,
@@ -86,7 +86,7 @@ impl QuantitiesRecord {
         OrbitQuantity::ALL.into_iter().filter_map(value).collect()
     }
 
-    /// Value and error of a quantity that is in it.
+    /// Value and uncertainty of a quantity, if present.
     pub fn of(&self, quantity: OrbitQuantity) -> Option<(f64, Option<f64>)> {
         let (value, sigma) = match quantity {
             OrbitQuantity::Period | OrbitQuantity::Eccentricity | OrbitQuantity::Omega => return None,

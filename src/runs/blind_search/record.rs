@@ -21,66 +21,66 @@ use std::collections::BTreeMap;
 /// Name of the file.
 pub const FILE: &str = "periodogram.json";
 
-/// False-alarm probabilities whose levels are given.
+/// False-alarm probabilities for which levels are given.
 const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
 
 /// The content of `periodogram.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeriodogramFile {
-    /// What is said of the best orbit; where the first planet of the config has a known ephemeris, of that planet.
+    /// The verdict on the best orbit; where the first planet of the config has a known ephemeris, on that planet.
     pub verdict: Verdict,
-    /// In the expansion around its own image; its errors count the period's. Where the first planet of the config has a
-    /// known ephemeris, its orbit.
+    /// From the expansion around its own image; its uncertainties include the period's. Where the first planet of the
+    /// config has a known ephemeris, its orbit.
     pub best: OrbitRecord,
-    /// Planets of known ephemeris, in the order of the config; peaks are of the search beside them.
+    /// Planets of known ephemeris, in the order of the config; peaks are of the search with them in the model.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub known_planets: Vec<KnownPlanetRecord>,
-    /// What is said of the highest peak, where the verdict is on a planet of known ephemeris.
+    /// The verdict on the highest peak, where the main verdict is on a planet of known ephemeris.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind: Option<Verdict>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
-    /// The same of what is usually quoted of the orbit, times nearest to those found.
+    /// The same for commonly quoted quantities of the orbit, times nearest to those found.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derived_truth: BTreeMap<String, f64>,
-    /// Of the highest peak without a planet.
+    /// For the highest peak of the planet-free search.
     pub false_alarm: FalseAlarmRecord,
     /// Around the planet-free image, from high to low.
     pub peaks: Vec<PeakRecord>,
     /// Around the best orbit first, then around the other peaks.
     pub keplerian: Option<Vec<Option<KeplerianRecord>>>,
-    /// The second planet, if it was asked for.
+    /// The second planet, if requested.
     pub second: Option<SecondRecord>,
-    /// What was searched.
+    /// The settings of the search.
     pub search: SearchRecord,
-    /// The spots as a field, where all maps are integrated over.
+    /// The field of spots, where all maps are marginalised over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<SpotField>,
-    /// Whether the star changes, where spots are taken for unchanging.
+    /// Whether the spots evolve, where they are assumed static.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub change: Option<Change>,
     /// Another rotation period with which the profiles are far more probable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_rotation: Option<OtherRotation>,
-    /// The quadratic that it was searched in.
+    /// The quadratic of the search.
     pub expansion: ExpansionRecord,
-    /// A constant velocity left free beside the orbit.
+    /// A constant velocity that is free together with the orbit.
     pub offset: Option<Offset>,
-    /// Systemic velocity beside the best orbit, where it is free: velocities of `rv.csv` count from it, and their
-    /// errors do not have its own.
+    /// Systemic velocity with the best orbit, where it is free: velocities of `rv.csv` are relative to it, and their
+    /// uncertainties do not include its uncertainty.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub systemic_velocity: Option<ConstantVelocity>,
-    /// Drift of the velocities beside the best orbit, where one is integrated out.
+    /// Drift of the velocities with the best orbit, where one is marginalised over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drift: Option<FoundDrift>,
-    /// What is lost where the orbit turns with the star.
+    /// Loss of sensitivity where the orbit is synchronous with the rotation.
     pub co_rotation: CoRotationRecord,
-    /// Whether the best orbit hangs on a choice.
+    /// Dependence of the best orbit on single choices.
     pub robustness: RobustnessRecord,
     /// Bayes factors of no, one and two planets, where the config has priors for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<EvidenceRecord>,
-    /// What has to be known beside the verdict.
+    /// Remarks beside the verdict.
     pub warnings: Vec<String>,
     /// Config, data and program.
     #[serde(flatten)]
@@ -88,12 +88,12 @@ pub struct PeriodogramFile {
 }
 
 impl PeriodogramFile {
-    /// The first planet of the config, where its ephemeris is known: what the verdict is on.
+    /// The first planet of the config, where its ephemeris is known: the subject of the verdict.
     pub fn first_known(&self) -> Option<&KnownPlanetRecord> {
         self.known_planets.first().filter(|planet| planet.planet == 1)
     }
 
-    /// The planets of known ephemeris that the verdict is not on.
+    /// The other planets of known ephemeris.
     pub fn other_known(&self) -> &[KnownPlanetRecord] {
         &self.known_planets[usize::from(self.first_known().is_some())..]
     }
@@ -114,25 +114,25 @@ impl Saved for PeriodogramFile {
 pub struct OrbitRecord {
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
-    /// Its error (km/s).
+    /// Its uncertainty (km/s).
     pub sigma_k_kms: f64,
     /// Period (d).
     pub period_d: f64,
-    /// Its error (d).
+    /// Its uncertainty (d).
     pub sigma_period_d: Option<f64>,
     /// Period over the rotation period.
     pub porb_over_prot: f64,
-    /// Its error.
+    /// Its uncertainty.
     pub sigma_porb_over_prot: Option<f64>,
     /// Phase (cycles).
     pub phi: f64,
-    /// Its error (cycles); null where K is 0.
+    /// Its uncertainty (cycles); null where K is 0.
     pub sigma_phi: Option<f64>,
     /// Gain in ln L.
     pub delta_ln_l: f64,
     /// Whether its period is the first or last of the search.
     pub on_edge: bool,
-    /// What is usually quoted of it.
+    /// Its commonly quoted quantities.
     #[serde(flatten)]
     pub quantities: QuantitiesRecord,
 }
@@ -142,14 +142,14 @@ pub struct OrbitRecord {
 pub struct KnownPlanetRecord {
     /// Its number in the config, from 1.
     pub planet: usize,
-    /// What is said of it.
+    /// The verdict on it.
     pub verdict: Verdict,
-    /// Its orbit: K over all ephemerides within their errors, all else as given.
+    /// Its orbit: K over all ephemerides within their uncertainties, all else as given.
     pub orbit: OrbitRecord,
-    /// Its shape, where the config gives one; a circle otherwise.
+    /// Its shape, where the config gives one; circular otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
-    /// What RV offsets of nights make of it, where it would be a candidate.
+    /// The effect of night RV offsets on it, where it would be a candidate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_offsets: Option<NightOffsets>,
 }
@@ -168,16 +168,16 @@ pub struct PeakRecord {
     /// Its orbit.
     #[serde(flatten)]
     pub orbit: OrbitRecord,
-    /// How often a star without a planet shows one as high.
+    /// The false-alarm probability of a peak this high.
     #[serde(deserialize_with = "number_or_null")]
     pub false_alarm_probability: f64,
-    /// How it is an alias of the highest peak.
+    /// Its relation as an alias of the highest peak.
     pub alias: Option<AliasRecord>,
-    /// The period of the star, or alias of one, that it is not told from: spots imitate orbits there.
+    /// The stellar period, or its alias, from which it is not distinguished: spots mimic orbits there.
     pub rotation: Option<String>,
 }
 
-/// How a peak is an alias of the highest one.
+/// The relation of a peak to the highest one as its alias.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AliasRecord {
     /// Frequency of the sampling window (1/d).
@@ -193,29 +193,29 @@ pub struct AliasRecord {
 pub struct KeplerianRecord {
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
-    /// Its error (km/s).
+    /// Its uncertainty (km/s).
     pub sigma_k_kms: Option<f64>,
     /// Period (d).
     pub period_d: f64,
-    /// Its error (d).
+    /// Its uncertainty (d).
     pub sigma_period_d: Option<f64>,
     /// Eccentricity.
     pub eccentricity: f64,
-    /// Its error.
+    /// Its uncertainty.
     pub sigma_eccentricity: Option<f64>,
     /// Argument of periastron (degrees).
     pub omega_deg: f64,
-    /// Its error (degrees).
+    /// Its uncertainty (degrees).
     pub sigma_omega_deg: Option<f64>,
     /// Time of periastron (d).
     pub periastron_d: f64,
-    /// Its error (d).
+    /// Its uncertainty (d).
     pub sigma_periastron_d: Option<f64>,
     /// Gain in ln L.
     pub delta_ln_l: f64,
-    /// The part of it that a circular orbit does not have.
+    /// Its gain over a circular orbit.
     pub gain_over_circle: f64,
-    /// What is usually quoted of it.
+    /// Its commonly quoted quantities.
     #[serde(flatten)]
     pub quantities: QuantitiesRecord,
 }
@@ -233,7 +233,7 @@ pub struct SecondRecord {
     pub gain: Option<f64>,
 }
 
-/// What was searched.
+/// The settings of the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchRecord {
     /// Number of trial periods.
@@ -248,19 +248,19 @@ pub struct SearchRecord {
     pub seed: u64,
 }
 
-/// The quadratic that was searched in.
+/// The quadratic of the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExpansionRecord {
-    /// Parameters that are integrated out.
+    /// Parameters that are marginalised over.
     pub marginalised: Vec<String>,
-    /// How many times larger than the entropy expects unresolved spots are, in variance: without a planet, at the best
+    /// Size of unresolved spots relative to the entropy's expectation, in variance: without a planet, at the best
     /// orbit.
     pub unresolved_spots: [f64; 2],
-    /// Delta ln L of the best orbit with spots as the entropy sees them.
+    /// Delta ln L of the best orbit with spots of the entropy's size.
     pub regularised_delta_ln_l: f64,
-    /// Expansions that the best orbit took.
+    /// Number of expansions for the best orbit.
     pub rounds: usize,
-    /// Whether K stays in the last one.
+    /// Whether K has converged.
     pub closed: bool,
     /// Number of data.
     pub data: usize,
@@ -272,46 +272,46 @@ pub struct ExpansionRecord {
     pub chi2_per_datum: f64,
 }
 
-/// What is lost where the orbit turns with the star.
+/// Loss of sensitivity where the orbit is synchronous with the rotation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CoRotationRecord {
     /// sigma_K at the rotation period over its median elsewhere.
     pub sigma_k_over_median: Option<f64>,
-    /// The same in words.
+    /// The same as text.
     pub statement: String,
 }
 
-/// How often a star without a planet shows as high a peak.
+/// The false-alarm probability of a peak.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FalseAlarmRecord {
     /// Height of the peak.
     pub delta_ln_l: f64,
-    /// The probability, by what is `used`.
+    /// The adopted probability, by the method in `used`.
     #[serde(deserialize_with = "number_or_null")]
     pub probability: f64,
-    /// The share of draws with as high a peak.
+    /// The fraction of draws with as high a peak.
     pub by_draws: f64,
-    /// What the distribution of highest peaks says.
+    /// From the distribution of highest peaks.
     #[serde(deserialize_with = "number_or_null")]
     pub by_extreme_value: f64,
     /// `draws` or `extreme value`.
     pub used: String,
     /// Number of draws.
     pub draws: usize,
-    /// RV offset of a night of these stars: its standard deviation (km/s).
+    /// RV offset per night in these draws: its standard deviation (km/s).
     #[serde(default)]
     pub night_offsets_kms: f64,
     /// Effective bandwidth of the search (Baluev 2008).
     #[serde(deserialize_with = "number_or_null")]
     pub w: f64,
-    /// How many independent periods there are.
+    /// Number of independent periods.
     #[serde(deserialize_with = "number_or_null")]
     pub independent_periods: f64,
     /// Heights of usual probabilities.
     pub levels: [LevelRecord; 3],
 }
 
-/// A height that chance reaches with some probability.
+/// A height with its false-alarm probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelRecord {
     /// The probability.
@@ -320,17 +320,17 @@ pub struct LevelRecord {
     pub delta_ln_l: f64,
 }
 
-/// Whether the best orbit hangs on a choice; empty where that was not tried.
+/// Dependence of the best orbit on single choices; empty where that was not tested.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RobustnessRecord {
     /// K at the best period with other targets.
     pub targets: Vec<TargetRecord>,
     /// K at the best period without each night; empty for profiles of one night.
     pub without_night: Vec<NightRecord>,
-    /// The sum over them of what the planet adds to their prediction; null for less than two nights.
+    /// The sum over them of the gain by the planet in their prediction; null for less than two nights.
     #[serde(default)]
     pub held_out_nights: Option<HeldOut>,
-    /// What RV offsets of nights, larger than the search counts, make of the highest peak, if it is a candidate.
+    /// The effect on the highest peak, if it is a candidate, of night RV offsets larger than those of the search.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_offsets: Option<NightOffsets>,
 }
@@ -350,14 +350,14 @@ pub struct TargetRecord {
 /// The orbit at the best period without the profiles of a night.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NightRecord {
-    /// First time left out (d).
+    /// First omitted time (d).
     pub first_time_d: f64,
-    /// Last time left out (d).
+    /// Last omitted time (d).
     pub last_time_d: f64,
-    /// Number of profiles left out.
+    /// Number of omitted profiles.
     pub profiles: usize,
-    /// ln p of the profiles left out given all others, with the orbit of these above that without a planet; null where
-    /// these bound no orbit.
+    /// ln p of the omitted profiles given all others, with the orbit of these relative to that without a planet; null
+    /// where these bound no orbit.
     #[serde(default)]
     pub delta_ln_p: Option<f64>,
     /// The orbit.
@@ -370,7 +370,7 @@ pub struct NightRecord {
 pub struct QuickRecord {
     /// Semi-amplitude (km/s).
     pub k_kms: Option<f64>,
-    /// Its error (km/s).
+    /// Its uncertainty (km/s).
     pub sigma_k_kms: Option<f64>,
     /// Phase (cycles).
     pub phi: Option<f64>,
@@ -379,7 +379,7 @@ pub struct QuickRecord {
 }
 
 impl PeriodogramFile {
-    /// All that `search` found.
+    /// All results of `search`.
     pub(super) fn of(search: &BlindSearch) -> Self {
         let BlindSearch { scene, settings, detection: found, .. } = search;
         let (star, span) = (&scene.imager.star, scene.observations.time_span_d());
@@ -398,7 +398,7 @@ impl PeriodogramFile {
             gain: second.both.map(|both| both.gain),
         });
         let best = orbit(&found.best);
-        // the highest one with the spots as they are beside it
+        // the highest one with the spots fitted together with it
         let mut all = peaks(&found.blind);
         if let Some(highest) = all.first_mut() {
             highest.orbit = orbit(found.highest());
@@ -514,7 +514,7 @@ impl KeplerianRecord {
 }
 
 impl FalseAlarmRecord {
-    /// Of the highest peak of `search`.
+    /// For the highest peak of `search`.
     fn of(search: &Search) -> Self {
         let alarm = &search.false_alarm;
         let delta_ln_l = search.best().orbit.delta_ln_l;
@@ -569,7 +569,7 @@ impl QuickRecord {
     }
 }
 
-/// An error, where there is one.
+/// An uncertainty, if there is one.
 fn known(sigma: f64) -> Option<f64> {
     sigma.is_finite().then_some(sigma)
 }

@@ -1,4 +1,4 @@
-//! The search of a star, what is to be said of it, and the verdict.
+//! The search of a star, its remarks, and the verdict.
 
 use super::options::{BlindSearchError, BlindSearchOptions, RobustnessOf};
 use super::priors::within_priors;
@@ -21,32 +21,32 @@ pub struct BlindSearch<'a> {
     pub(super) scene: &'a Scene,
     pub(super) settings: DetectionSettings,
     pub(super) detection: Cow<'a, Detection>,
-    /// Whether the best orbit depends on a choice, where that was tried.
+    /// Dependence of the best orbit on single choices, where that was tested.
     pub(super) robustness: Option<Robustness>,
-    /// What RV offsets of nights make of the highest peak.
+    /// The effect of night RV offsets on the highest peak.
     pub(super) night_offsets: Option<NightOffsets>,
-    /// The same of each planet of known ephemeris, in the order of the config.
+    /// The same for each planet of known ephemeris, in the order of the config.
     pub(super) known_night_offsets: Vec<Option<NightOffsets>>,
-    /// The profiles as the spots of a star without a planet explain them.
+    /// The profiles with the model of the spots of a star without a planet.
     pub(super) planet_free: Explained,
-    /// The same beside the best orbit.
+    /// The same with the best orbit.
     pub(super) at_best: Explained,
-    /// Systemic velocity and RV offsets of data sets beside the best orbit; `None` where they are not bounded.
+    /// Systemic velocity and RV offsets of data sets with the best orbit; `None` where they are not bounded.
     pub(super) constants: Option<Constants>,
     /// Bayes factors, where the config has priors for them.
     pub(super) evidence: Option<EvidenceRecord>,
-    /// What is said of the best orbit, or of the first planet where that is one of known ephemeris.
+    /// The verdict on the best orbit, or on the first planet where that is one of known ephemeris.
     pub verdict: Verdict,
-    /// What is said of each planet of known ephemeris, in the order of the config.
+    /// The verdict on each planet of known ephemeris, in the order of the config.
     pub known: Vec<Verdict>,
-    /// What is said of the highest peak, where the verdict is on a planet of known ephemeris.
+    /// The verdict on the highest peak, where the main verdict is on a planet of known ephemeris.
     pub blind: Option<Verdict>,
-    /// What has to be known beside the verdict.
+    /// Remarks beside the verdict.
     pub remarks: Vec<Remark>,
 }
 
 impl<'a> BlindSearch<'a> {
-    /// Searches; `report` is told what is under way.
+    /// Searches; `report` is called with the current stage.
     ///
     /// # Errors
     /// [`BlindSearchError`].
@@ -58,8 +58,8 @@ impl<'a> BlindSearch<'a> {
         Ok(BlindSearch::judged(scene, options, Cow::Owned(found), report))
     }
 
-    /// What is said of the star before an orbit is climbed to or sampled; the search `before` is taken where there is
-    /// one. `None` where no orbit is asked for, K being fixed. Where the search fails the verdict says why.
+    /// The summary for the star before an orbit is optimised or sampled; the search `before` is used where there is
+    /// one. `None` where no orbit is searched for, K being fixed. Where the search fails the verdict says why.
     #[doc(hidden)]
     pub fn summary_of(scene: &'a Scene, before: Option<&'a Detection>) -> Option<SearchSummary> {
         scene.settings.free.iter().find(|f| f.parameter == Parameter::K)?;
@@ -116,7 +116,7 @@ impl<'a> BlindSearch<'a> {
         for (planet, offsets) in detection.known.planets.iter().zip(&known_night_offsets) {
             let mut against = of_the_star.clone();
             let offsets = offsets.and_then(of_night_offsets);
-            // of the first one it is said with the rest
+            // the verdict on the first one is the main verdict
             if planet.ephemeris.planet > 0 {
                 let number = planet.ephemeris.planet + 1;
                 let said = |remark: &Remark| Remark::note(format!("Known planet {number}: {}", remark.text));
@@ -128,7 +128,7 @@ impl<'a> BlindSearch<'a> {
         let mut verdict = detection.verdict(&remarks);
         let mut blind = None;
         if first.is_some() {
-            // what is said of the highest peak beside it
+            // the verdict on the highest peak in addition
             let is_tried = detection.is_candidate() && compares;
             let tried = is_tried.then(|| try_out(Tried::Peak(detection.highest())));
             let of_the_peak = detection.of_the_peak(tried.as_ref(), night_offsets);
@@ -139,7 +139,7 @@ impl<'a> BlindSearch<'a> {
             remarks.extend(of_the_peak.into_iter().map(said));
             remarks.extend(of_a_companion(&detection));
         } else if scene.settings.free.iter().any(|f| f.parameter == Parameter::K) {
-            // where an orbit is asked for, of those that are allowed
+            // where an orbit is required, among those that are allowed
             verdict = within_priors(scene, &detection, verdict, &mut remarks);
         }
         let (verdict, blind) = (judged(verdict), blind.map(judged));
@@ -163,13 +163,13 @@ impl<'a> BlindSearch<'a> {
         }
     }
 
-    /// What the config leaves to the observations, RV offsets of data sets beside the best orbit.
+    /// Quantities measured from the observations, RV offsets of data sets with the best orbit.
     pub(super) fn measured(&self) -> Measured {
         let offsets = self.constants.as_ref().map_or(&[][..], |constants| &constants.offsets);
         self.scene.measured.clone().with_zero_points(offsets)
     }
 
-    /// The head of it, for results that rest on it.
+    /// The summary, for results that depend on it.
     pub fn summary(self) -> SearchSummary {
         let BlindSearch { detection, verdict, known, blind, mut remarks, evidence, .. } = self;
         let beside = known.into_iter().skip(usize::from(blind.is_some())).map(|verdict| verdict.sentence);
@@ -181,7 +181,7 @@ impl<'a> BlindSearch<'a> {
     }
 }
 
-/// That another planet was found beside those that are known.
+/// The remark that another planet was found in addition to the known ones.
 fn of_a_companion(detection: &Detection) -> Option<Remark> {
     let frequency = detection.known.companion?;
     let period_d = detection.frequencies.rotation_period_d / frequency;
@@ -191,7 +191,7 @@ fn of_a_companion(detection: &Detection) -> Option<Remark> {
     )))
 }
 
-/// What is said of a planet of known ephemeris, one of so many, beside the remarks on its star.
+/// The verdict on a planet of known ephemeris, one of so many, given the remarks on its star.
 fn verdict_on(planet: &KnownPlanet, of: usize, remarks: &[Remark]) -> Verdict {
     let Some(k) = planet.k else { return Verdict::not_judged(UNBOUNDED) };
     let [k_kms, sigma_k_kms] = k.moments;

@@ -1,4 +1,4 @@
-//! What a blind search says, for the results of the commands that go on from it.
+//! The summary of a blind search, for the results of commands that follow it.
 
 use super::options::BlindSearchError;
 use crate::inference::evidence::EvidenceRecord;
@@ -7,14 +7,14 @@ use crate::planets::periodogram::window::is_same_frequency;
 use crate::planets::verdict::{Remark, Verdict};
 use serde::{Deserialize, Serialize};
 
-/// What a blind search says.
+/// The summary of a blind search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchSummary {
-    /// What is said of the best orbit.
+    /// The verdict on the best orbit.
     pub verdict: Verdict,
-    /// What has to be known beside the verdict.
+    /// Remarks beside the verdict.
     pub remarks: Vec<Remark>,
-    /// The star's own periods under this sampling; null where there was no search.
+    /// The star's periods under this sampling; null where there was no search.
     #[doc(hidden)]
     pub rotation: Option<RotationPeriods>,
     /// Bayes factors of no, one and two planets; absent where the config has no priors for them.
@@ -24,13 +24,13 @@ pub struct SearchSummary {
 }
 
 impl SearchSummary {
-    /// Where the search failed.
+    /// For a failed search.
     pub(super) fn failed(error: &BlindSearchError) -> Self {
         let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
         SearchSummary { verdict, remarks: Vec::new(), rotation: None, evidence: None }
     }
 
-    /// The same beside an orbit that was found, of this `Porb/Prot`.
+    /// The same for an orbit that was found, with this `Porb/Prot`.
     #[doc(hidden)]
     pub fn beside(mut self, porb_over_prot: f64, rotation_period_d: f64) -> Self {
         let another = self.of_another_orbit(porb_over_prot, rotation_period_d);
@@ -41,8 +41,7 @@ impl SearchSummary {
         self
     }
 
-    /// What speaks against a planet where the orbit that was found, of this `Porb/Prot`, is not the one that the
-    /// verdict is on.
+    /// The caveat on an orbit that was found, with this `Porb/Prot`, where the verdict is on another one.
     #[doc(hidden)]
     pub fn of_another_orbit(&self, porb_over_prot: f64, rotation_period_d: f64) -> Option<Remark> {
         let (judged, rotation) = (self.verdict.signal?.period_d, self.rotation.as_ref()?);

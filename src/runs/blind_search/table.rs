@@ -1,5 +1,4 @@
-//! The result of a blind search as text: the best orbit, how often chance does as well, the peaks, and what may be
-//! wrong.
+//! The result of a blind search as text: the best orbit, its false-alarm probability, the peaks, and possible problems.
 
 use super::quantities::QuantitiesRecord;
 use super::record::{
@@ -16,7 +15,7 @@ use crate::surface::ConstantVelocity;
 const SHOWN: usize = 6;
 
 impl PeriodogramFile {
-    /// What is printed of the search: the table, and what the config leaves to the observations.
+    /// The printed output of the search: the table, and the quantities measured from the observations.
     pub fn printed(&self) -> String {
         let OrbitRecord { period_d, porb_over_prot, .. } = self.best;
         let measured = self.provenance.measured.lines();
@@ -24,7 +23,7 @@ impl PeriodogramFile {
         self.table(period_d / porb_over_prot) + &measured
     }
 
-    /// The text, a line or a table after the other.
+    /// The text, one line or table after the other.
     fn table(&self, rotation_period_d: f64) -> String {
         let mut text = self.verdicts() + "\n";
         // the best orbit, or the first known planet, with the other known ones
@@ -78,20 +77,20 @@ impl PeriodogramFile {
         text
     }
 
-    /// At which periods.
+    /// The period range.
     fn searched(&self) -> String {
         let SearchRecord { periods, min_period_d, max_period_d, .. } = self.search;
         format!("Searched: {min_period_d:.3} to {max_period_d:.1} d ({periods} periods)")
     }
 
-    /// How significant the highest peak is, at which periods it was searched, and how single nights count.
+    /// The significance of the highest peak, the period range, and the weight of single nights.
     pub fn significance(&self) -> Vec<String> {
         let nights = without_nights(&self.robustness.without_night) + &held_out(&self.robustness);
         let text = format!("{}\n{}\n{nights}", chance(&self.false_alarm), self.searched());
         text.lines().map(|line| format!("{line}.")).collect()
     }
 
-    /// What is said of the planets, a line each.
+    /// The verdicts on the planets, one line each.
     fn verdicts(&self) -> String {
         let mut lines = vec![self.verdict.sentence.clone()];
         lines.extend(self.other_known().iter().map(|planet| planet.verdict.sentence.clone()));
@@ -99,7 +98,7 @@ impl PeriodogramFile {
         lines.iter().map(|line| format!("{line}\n")).collect()
     }
 
-    /// Parameters of one orbit or several of these names, a line each, beside the true ones of a single one.
+    /// Parameters of one orbit or several with these names, one line each, beside the true ones of a single one.
     fn orbits(&self, orbits: &[OrbitRecord], names: &[String], prot: f64) -> String {
         let truth = self.truth.filter(|_| orbits.len() == 1);
         let head = if truth.is_some() { &["parameter", "truth"][..] } else { &["parameter"] };
@@ -135,7 +134,7 @@ impl PeriodogramFile {
         aligned(&rows)
     }
 
-    /// Rows of what is usually quoted of the same orbits.
+    /// Rows of commonly quoted quantities of the same orbits.
     fn quantity_rows(&self, orbits: &[OrbitRecord], with_truth: bool) -> Vec<Vec<String>> {
         let row = |quantity: OrbitQuantity| {
             let all: Option<Vec<_>> = orbits.iter().map(|orbit| orbit.quantities.of(quantity)).collect();
@@ -160,7 +159,7 @@ fn plural(count: usize) -> &'static str {
     if count > 1 { "s" } else { "" }
 }
 
-/// What the names in the table of orbits mean, a line each.
+/// Descriptions of the names in the table of orbits, one line each.
 fn meanings(found: &QuantitiesRecord) -> String {
     let given = OrbitQuantity::ALL.into_iter().filter(|quantity| found.of(*quantity).is_some());
     let meanings = given.map(|quantity| (quantity.name(), quantity.definition()));
@@ -188,7 +187,7 @@ fn eccentric(orbit: &KeplerianRecord) -> String {
     text
 }
 
-/// K at the best period under other choices, a line each.
+/// K at the best period under other choices, one line each.
 fn robustness(found: &RobustnessRecord) -> String {
     let shown = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
     let row = |what: String, orbit: &QuickRecord| {
@@ -214,7 +213,7 @@ fn held_out(found: &RobustnessRecord) -> String {
     })
 }
 
-/// How far K and the height of the peak depend on a single night.
+/// Dependence of K and the height of the peak on a single night.
 fn without_nights(nights: &[NightRecord]) -> String {
     let least = |of: fn(&QuickRecord) -> Option<f64>, sign: f64| {
         let all = nights.iter().filter_map(|night| Some((sign * of(&night.orbit)?, night.first_time_d)));
@@ -250,7 +249,7 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
     )
 }
 
-/// A false-alarm probability in a table: beyond the simulations an upper limit.
+/// A false-alarm probability in a table: an upper limit below the resolution of the simulations.
 fn short(p: f64, draws: usize) -> String {
     extrapolated(p, draws).map_or_else(|| probability(p), |limit| format!("< {limit}"))
 }

@@ -1,8 +1,8 @@
-//! What is sent between ranks: a tag, and bytes.
+//! Messages between ranks: a tag, and bytes.
 
 use mpi::Tag;
 
-/// From a worker, once: how many questions it answers at once (8 bytes).
+/// From a worker, once: the number of questions that it answers at once (8 bytes).
 pub(super) const HELLO: Tag = 1;
 
 /// To a worker: an [`Order`].
@@ -11,27 +11,27 @@ pub(super) const ORDER: Tag = 2;
 /// From a worker: an answer.
 pub(super) const ANSWER: Tag = 3;
 
-/// To a worker: a question about the brief of that number. Each has a tag of its own, so that threads that do not know
-/// yet that the one before is over leave them alone.
+/// To a worker: a question on the brief of that number. Each brief has its own tag, so that threads that still work on
+/// the previous brief leave them alone.
 pub(super) fn question(brief: usize) -> Tag {
     const FIRST: usize = 4;
     const TAGS: usize = 1000;
     (FIRST + brief % TAGS) as Tag
 }
 
-/// What a worker is told.
+/// An order to a worker.
 #[derive(Clone, Copy)]
 pub(super) enum Order {
-    /// What the next questions are about follows as a broadcast of so many bytes.
+    /// The subject of the next questions follows as a broadcast of so many bytes.
     Brief(usize),
-    /// What is under way is wanted soon.
+    /// Current evaluations should end soon.
     Stop,
-    /// Nothing more is asked.
+    /// The end of all questions.
     Dismissed,
 }
 
 impl Order {
-    /// As two numbers.
+    /// Encoded as two numbers.
     pub(super) fn to_bytes(self) -> Vec<u8> {
         let (kind, length) = match self {
             Order::Brief(length) => (0, length),
@@ -60,7 +60,7 @@ pub(super) fn number(number: usize) -> [u8; NUMBER] {
     (number as u64).to_le_bytes()
 }
 
-/// The number that a message begins with, and the rest.
+/// The first number of a message, and the rest.
 pub(super) fn split(message: &[u8]) -> (usize, &[u8]) {
     let (number, rest) = message.split_first_chunk().expect("a message of this program begins with its number");
     (u64::from_le_bytes(*number) as usize, rest)

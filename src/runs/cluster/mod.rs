@@ -1,8 +1,8 @@
-//! Ranks of MPI: rank 0 asks, the others answer, in bytes. One queue: every question goes to whoever is free, and the
-//! answers come in the order of the questions.
+//! MPI ranks: rank 0 asks, the others answer, in bytes. One queue: every question goes to a free rank, and the answers
+//! come in the order of the questions.
 //!
-//! A panic on any rank, on any thread, ends them all: without that the others would wait for it forever. Nobody burns a
-//! processor while waiting (`nap`).
+//! A panic on any rank, on any thread, ends them all: otherwise the others would wait indefinitely. Waiting uses almost
+//! no processor time (`nap`).
 
 mod hands;
 mod message;
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 /// Exit code of a job that a panic ended, as that of a program that panics.
 const PANICKED: i32 = 101;
 
-/// Variables that launchers of MPI set for every rank.
+/// Variables that MPI launchers set for every rank.
 const LAUNCHED: [&str; 5] = ["OMPI_COMM_WORLD_SIZE", "PMI_RANK", "PMIX_RANK", "MPI_LOCALRANKID", "PALS_RANKID"];
 
 /// One process among others.
@@ -37,16 +37,16 @@ pub enum Rank {
 /// Why there are no ranks.
 #[derive(Debug, thiserror::Error)]
 pub enum ClusterError {
-    /// MPI does not begin, or has begun before.
+    /// MPI does not start, or was started before.
     #[error("MPI does not start")]
     Start,
-    /// Panics could not end the job from the thread that they happen on.
+    /// Panics could not end the job from their thread.
     #[error("this MPI does not allow calls from several threads (MPI_THREAD_MULTIPLE)")]
     Threads,
 }
 
 /// Joins the ranks that a launcher has started, this one answering so many questions at once if it is not the first;
-/// without a launcher there is nobody to join, and MPI is left alone.
+/// without a launcher this is the only rank, and MPI is not used.
 ///
 /// # Errors
 /// [`ClusterError`].
@@ -75,7 +75,7 @@ pub fn abort(code: i32) -> ExitCode {
     SimpleCommunicator::world().abort(code)
 }
 
-/// After the message of a panic, ends all ranks.
+/// Ends all ranks after the message of a panic.
 fn abort_on_panic() {
     let message = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

@@ -1,4 +1,4 @@
-//! Rank 0: questions out to whoever is free, answers back in order.
+//! Rank 0: questions to free ranks, answers in order.
 
 use super::Ranks;
 use super::hands::Hands;
@@ -12,19 +12,19 @@ use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// The other ranks, as the first one sees them; dismissed when this is dropped.
+/// The other ranks, from the first one; dropping it dismisses them.
 pub struct Queue {
     ranks: Ranks,
-    /// How many questions each answers at once.
+    /// Number of questions that each answers at once.
     at_once: Vec<(Rank, usize)>,
-    /// What they were told last, and how often they were told something.
+    /// The last brief, and the number of briefs so far.
     brief: RefCell<(Vec<u8>, usize)>,
-    /// How long a question about it takes, once it is known.
+    /// Duration of a question on it, once it is known.
     each: Cell<Option<Duration>>,
 }
 
 impl Queue {
-    /// Waits until all of them are there.
+    /// Waits until all of them have started.
     pub(super) fn new(universe: Universe) -> Self {
         let ranks = Ranks::new(universe);
         let hello = |rank| {
@@ -35,13 +35,13 @@ impl Queue {
         Queue { ranks, at_once, brief: RefCell::default(), each: Cell::default() }
     }
 
-    /// How many questions are answered at once.
+    /// Number of questions answered at once.
     pub fn size(&self) -> usize {
         self.at_once.iter().map(|(_, at_once)| at_once).sum()
     }
 
-    /// The answers to the first of the `questions` about `brief`: to all, unless `stop` is set meanwhile, after which
-    /// none is asked any more and those that were are waited for.
+    /// The answers to the first of the `questions` on `brief`: to all, unless `stop` is set meanwhile; after that no
+    /// further question is asked, and pending ones are waited for.
     pub fn answers(&self, brief: &[u8], questions: &[Vec<u8>], stop: &AtomicBool) -> Vec<Vec<u8>> {
         let tag = question(self.tell(brief));
         let mut hands = Hands::new(&self.at_once);
@@ -87,7 +87,7 @@ impl Queue {
         answers.into_iter().map_while(|answer| answer).collect()
     }
 
-    /// Tells all ranks what the next questions are about, unless they know; gives the number of this brief.
+    /// Sends all ranks the brief of the next questions, unless they have it; returns its number.
     fn tell(&self, brief: &[u8]) -> usize {
         let (last, number) = &mut *self.brief.borrow_mut();
         if last != brief {

@@ -1,7 +1,7 @@
-//! The other ranks: told what questions are about, they answer until they are dismissed.
+//! The other ranks: they receive a brief and answer questions until they are dismissed.
 //!
-//! Every thread takes its questions from MPI and sends its answers itself, so that nothing has to wake up for either
-//! while all are busy; the main thread hears orders.
+//! Every thread takes its questions from MPI and sends its answers itself, so that no other thread has to wake up while
+//! all are busy; the main thread receives orders.
 
 use super::message::{ANSWER, HELLO, ORDER, Order, number, numbered, question, split};
 use super::nap::{WHILE_IDLE, Wait, nap};
@@ -14,10 +14,10 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// How long it takes at most until an order is heard; questions do not wait for it.
+/// Longest delay of an order; questions do not wait for it.
 const UNHEARD: Duration = Duration::from_millis(5);
 
-/// Answers a question, from any thread; the flag is set when it is wanted soon.
+/// Answers a question, from any thread; the flag is set when it should end soon.
 pub type Answer<'a> = Box<dyn Fn(&[u8], &Arc<AtomicBool>) -> Vec<u8> + Sync + 'a>;
 
 /// A rank that answers.
@@ -36,10 +36,10 @@ impl Worker {
         self.ranks.world.rank()
     }
 
-    /// Answers until dismissed, by what `learn` makes of each brief.
+    /// Answers until dismissed, with the function that `learn` returns for each brief.
     ///
     /// # Errors
-    /// What `learn` says; the other ranks wait for this one then, and must be ended.
+    /// The error of `learn`; the other ranks then wait for this one, and must be ended.
     pub fn serve<'a, E>(&self, learn: impl Fn(&[u8]) -> Result<Answer<'a>, E>) -> Result<(), E> {
         first(&self.ranks.world).send_with_tag(&number(self.at_once)[..], HELLO);
         let mut brief = self.wait(&AtomicBool::new(false));
@@ -50,7 +50,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Answers questions about the brief of this number until there is another; `None` when dismissed.
+    /// Answers questions on the brief of this number until the next one; `None` when dismissed.
     fn answer(&self, answer: &Answer, brief: usize) -> Option<Vec<u8>> {
         let (stop, over, ear) = (Arc::new(AtomicBool::new(false)), AtomicBool::new(false), Mutex::new(()));
         std::thread::scope(|scope| {
@@ -69,7 +69,7 @@ impl Worker {
         })
     }
 
-    /// Waits for the next brief, and passes on that answers are wanted soon; `None` when dismissed.
+    /// Waits for the next brief, and forwards the order to end soon; `None` when dismissed.
     fn wait(&self, stop: &AtomicBool) -> Option<Vec<u8>> {
         loop {
             match self.order() {
@@ -95,7 +95,7 @@ impl Worker {
     }
 }
 
-/// Waits for the next question about a brief until it is `over`; one thread at a time has its `ear` at the door.
+/// Waits for the next question on a brief until it is `over`; the thread that holds `ear` receives.
 fn next_question(brief: usize, ear: &Mutex<()>, over: &AtomicBool) -> Option<Vec<u8>> {
     let _ear = ear.lock().unwrap_or_else(PoisonError::into_inner);
     let wait = Wait::new();

@@ -1,4 +1,4 @@
-//! What chain and landscape took: reconstructions, and model applications, which hardly depend on the machine.
+//! The cost of chain and likelihood grid: reconstructions, and model applications, which hardly depend on the machine.
 
 use super::{Compared, Pair};
 use crate::sampling::chain::Summary;
@@ -7,60 +7,60 @@ use crate::sampling::log_density::Status;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Error bars to either side of the chain's median that a grid covers along an axis that is missing.
+/// Error bars to either side of the chain's median that a grid covers along a missing axis.
 const REACH: f64 = 3.0;
 
-/// What both took.
+/// Both costs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// The chain.
     pub chain: ChainCost,
-    /// The landscape.
+    /// The likelihood grid.
     pub landscape: LandscapeCost,
 }
 
-/// What the chain took.
+/// The cost of the chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChainCost {
-    /// Reconstructions, the start included.
+    /// Reconstructions, including the start.
     pub reconstructions: usize,
-    /// How many of them failed.
+    /// Number of failed ones.
     pub failed: usize,
-    /// Median number of model applications that one took.
+    /// Median number of model applications per reconstruction.
     #[serde(alias = "passes_median")]
     pub model_applications_median: f64,
-    /// Those of all together.
+    /// Their total number.
     #[serde(alias = "passes")]
     pub model_applications: u64,
-    /// Seconds, the search before it included; null where they are not recorded.
+    /// Seconds, including the preceding search; null where they are not recorded.
     pub seconds: Option<f64>,
     /// Effective draws of the parameter that has fewest; null where unknown.
     pub effective_draws: Option<f64>,
 }
 
-/// What the landscape took.
+/// The cost of the likelihood grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LandscapeCost {
     /// Nodes.
     pub reconstructions: usize,
-    /// Beyond the reach of the target chi2.
+    /// Nodes with an unreachable target chi2.
     pub unreachable: usize,
-    /// How many failed.
+    /// Number of failed ones.
     pub failed: usize,
-    /// Median number of model applications that one took.
+    /// Median number of model applications per node.
     #[serde(alias = "passes_median")]
     pub model_applications_median: u32,
-    /// Those of all together.
+    /// Their total number.
     #[serde(alias = "passes")]
     pub model_applications: u64,
-    /// Seconds, the search before it included; null where they are not recorded.
+    /// Seconds, including the preceding search; null where they are not recorded.
     pub seconds: Option<f64>,
-    /// Nodes that the paraboloid was fitted to; null without one.
+    /// Nodes in the fit of the paraboloid; null without one.
     pub paraboloid_nodes: Option<usize>,
 }
 
 impl Cost {
-    /// What chain and landscape took.
+    /// The cost of chain and likelihood grid.
     pub(super) fn of(pair: &Pair, summary: &Summary, paraboloid: Option<&Paraboloid>) -> Self {
         let (chain, landscape) = (&pair.chain, &pair.landscape);
         let [chain_seconds, landscape_seconds] = pair.efforts.map(|effort| Some(effort?.seconds));
@@ -91,8 +91,8 @@ impl Cost {
     }
 }
 
-/// Nodes of a grid that also has the axes that are missing: as many to an error bar as there are on the others in the
-/// geometric mean, out to [`REACH`] error bars. `None` if none is missing.
+/// Nodes of a grid that includes the missing axes: with the geometric-mean number per error bar of the other axes, out
+/// to [`REACH`] error bars. `None` if none is missing.
 pub(super) fn nodes_needed(pair: &Pair, parameters: &BTreeMap<String, Compared>) -> Option<f64> {
     let spacings: Vec<f64> = parameters.values().filter_map(|one| one.spacing).collect();
     let missing = parameters.len() - spacings.len();

@@ -1,32 +1,33 @@
-//! The chain's draws on the axes of a landscape: how many are outside, and how far the others are from the landscape's
-//! distribution.
+//! The chain's draws on the axes of a likelihood grid: the fraction outside, and the distance of the others from the
+//! grid's distribution.
 
 use super::Pair;
 use crate::sampling::chain::{ParameterSummary, Summary};
 use crate::sampling::landscape::Marginal;
 use serde::{Deserialize, Serialize};
 
-/// Kolmogorov's statistic, times the root of the number of draws, that chance exceeds once in twenty times.
+/// Kolmogorov's statistic, times the root of the number of draws, that chance exceeds in 5 % of cases.
 const KOLMOGOROV95: f64 = 1.358;
 
-/// How far apart two cumulative distributions are.
+/// Distance of two cumulative distributions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Distance {
     /// Largest difference at a node of the axis, among the draws that are inside the grid.
     pub largest: f64,
-    /// What the finite number of effective draws alone exceeds once in twenty times; null where that number is unknown.
+    /// The distance that the finite number of effective draws alone exceeds in 5 % of cases; null where that number is
+    /// unknown.
     pub by_chance95: Option<f64>,
 }
 
-/// The chain's draws after the burn-in, on the axes of the landscape.
+/// The chain's draws after the burn-in, on the axes of the likelihood grid.
 pub(super) struct Draws {
-    /// The landscape under the run's prior, axis by axis; `None` where it is nowhere possible.
+    /// The likelihood grid under the run's prior, axis by axis; `None` where its density is zero everywhere.
     pub marginals: Vec<Option<Marginal>>,
-    /// Of those inside the grid: sorted, axis by axis.
+    /// Those inside the grid: sorted, axis by axis.
     inside: Vec<Vec<f64>>,
-    /// Share outside, of all axes together.
+    /// Fraction outside, for all axes together.
     pub outside: f64,
-    /// Of each.
+    /// The same for each axis.
     pub outside_axis: Vec<f64>,
 }
 
@@ -55,7 +56,7 @@ impl Draws {
         Draws { marginals, inside, outside, outside_axis: missed.into_iter().map(share).collect() }
     }
 
-    /// How far apart chain and landscape are along an axis; `None` where no draw is inside.
+    /// Distance of chain and likelihood grid along an axis; `None` where no draw is inside.
     pub fn distance(&self, axis: usize, chain: &ParameterSummary) -> Option<Distance> {
         let (marginal, draws) = (self.marginals[axis].as_ref()?, &self.inside[axis]);
         let share = |x: f64| draws.partition_point(|draw| *draw <= x) as f64 / draws.len() as f64;

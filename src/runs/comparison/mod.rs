@@ -1,9 +1,9 @@
-//! A chain against a landscape of the same data: the same posterior by two routes, and the paper's paraboloid beside
-//! them (`docs/method.md` section 6).
+//! A chain compared with a likelihood grid of the same data: the same posterior by two methods, and the paraboloid of
+//! Petit et al. (`docs/method.md` section 6).
 //!
-//! The landscape has no prior: it gets the run's before it is integrated. Differences are in units of the chain's error
-//! bar, half its 68 % interval. A sampled parameter without an axis is fixed in the landscape, which is then
-//! conditional.
+//! The likelihood grid has no prior: it is multiplied by the run's before marginalisation. Differences are in units of
+//! the chain's error bar, half its 68 % interval. A sampled parameter without an axis is fixed in the grid, which is
+//! then conditional.
 
 mod cost;
 mod draws;
@@ -34,26 +34,26 @@ pub const FILE: &str = "comparison.json";
 pub struct Comparison {
     /// Names of the sampled parameters, in order.
     pub names: Vec<String>,
-    /// What is said of each.
+    /// The comparison for each.
     pub parameters: BTreeMap<String, Compared>,
-    /// Sampled parameters that are fixed in the landscape: it is conditional on them, the chain marginal.
+    /// Sampled parameters that are fixed in the likelihood grid, which is conditional on them; the chain is marginal.
     pub fixed_in_landscape: Vec<String>,
-    /// Nodes that a grid over all sampled parameters would have needed, at the same spacing for each error bar and out
-    /// to three of them along the axes that are missing; null if none is.
+    /// Number of nodes of a grid over all sampled parameters, at the same spacing per error bar and out to three of
+    /// them along the missing axes; null if none is.
     pub nodes_needed: Option<f64>,
-    /// Share of the chain's draws outside the grid.
+    /// Fraction of the chain's draws outside the grid.
     pub outside: f64,
     /// Why there is no paraboloid; null where there is one.
     pub paraboloid_refused: Option<String>,
     /// Whether the chain has converged.
     pub converged: bool,
-    /// What each took.
+    /// The cost of each.
     pub cost: Cost,
     /// SHA-256 (hex) of the observations.
     pub data_sha256: String,
-    /// Versions of the program that made the chain and the landscape.
+    /// Versions of the program for the chain and the likelihood grid.
     pub versions: [String; 2],
-    /// What to bear in mind.
+    /// Notes on the comparison.
     pub notes: Vec<String>,
 }
 
@@ -77,13 +77,13 @@ pub struct Compared {
     pub chain: Interval,
     /// The paraboloid's vertex and error bar.
     pub paraboloid: Option<AgainstChain>,
-    /// Median and 68 % interval of the landscape under the run's prior.
+    /// Median and 68 % interval of the likelihood grid under the run's prior.
     pub landscape: Option<AgainstChain>,
     /// The largest difference between the distributions.
     pub distribution: Option<Distance>,
-    /// Where the landscape has it fixed.
+    /// Its value where the likelihood grid has it fixed.
     pub fixed_at: Option<f64>,
-    /// Share of the chain's draws beyond the ends of the axis.
+    /// Fraction of the chain's draws beyond the ends of the axis.
     pub outside: f64,
     /// Spacing of the axis, in error bars of the chain.
     pub spacing: Option<f64>,
@@ -98,7 +98,7 @@ pub struct Interval {
     pub ci68: [f64; 2],
 }
 
-/// Another estimate, and how it compares with the chain's.
+/// Another estimate, compared with the chain's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AgainstChain {
     /// The estimate.
@@ -130,7 +130,7 @@ impl Interval {
 }
 
 impl Comparison {
-    /// Compares; the paraboloid is that of the nodes which `rule` chooses.
+    /// Compares; the paraboloid is that of the nodes selected by `rule`.
     ///
     /// # Errors
     /// A chain without steps.
@@ -167,7 +167,7 @@ impl Comparison {
     }
 }
 
-/// Sampled parameter number `i`.
+/// The sampled parameter with index `i`.
 fn parameter(
     pair: &Pair,
     summary: &Summary,
@@ -214,7 +214,7 @@ fn parameter(
     }
 }
 
-/// Median and 68 % interval of a marginal of the landscape.
+/// Median and 68 % interval of a marginal of the likelihood grid.
 fn interval(marginal: &Marginal, periodic: bool) -> Interval {
     let median = marginal.quantile(0.5);
     let value = if periodic { wrap(median) } else { median };

@@ -1,15 +1,15 @@
-//! What to bear in mind when chain and landscape are compared, a sentence each.
+//! Notes on the comparison of chain and likelihood grid, one sentence each.
 
 use super::{Compared, Comparison};
 use crate::sampling::chain::Summary;
 
-/// Share of draws outside the grid that matters.
+/// Fraction of draws outside the grid from which it is reported.
 const OUTSIDE: f64 = 0.01;
 
 /// Spacing of an axis, in error bars, above which the trapezoid of a Gaussian is off by more than a part in a thousand.
 const COARSE: f64 = 1.6;
 
-/// The notes on `comparison`, whose chain says `summary`.
+/// The notes on `comparison`, whose chain has this `summary`.
 pub(super) fn notes(comparison: &Comparison, summary: &Summary) -> Vec<String> {
     let named = |is: &dyn Fn(&Compared) -> Option<f64>, text: &dyn Fn(&str, f64) -> String| -> Vec<String> {
         let value = |name: &String| is(&comparison.parameters[name]).map(|value| text(name, value));

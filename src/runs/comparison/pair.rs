@@ -1,5 +1,5 @@
-//! A run and a landscape that belong together: the same data and star, of one objective the same image, and axes that
-//! the chain samples.
+//! A run and a likelihood grid that match: the same data and star, the same image for one objective, and axes that the
+//! chain samples.
 
 use crate::data::config::{self, Config, Difference, Settings};
 use crate::data::io::effort::Effort;
@@ -15,61 +15,61 @@ use crate::sampling::landscape::Landscape;
 use crate::surface::ObjectiveKind;
 use std::path::{Path, PathBuf};
 
-/// A run and a landscape, read and found to belong together.
+/// A run and a likelihood grid, read and checked to match.
 #[derive(Debug)]
 pub struct Pair {
-    /// What the run was begun with.
+    /// Manifest of the run.
     pub manifest: Manifest,
     /// Its settings.
     pub settings: Settings,
     /// Its chain so far.
     pub chain: Chain,
-    /// What the landscape was begun with.
+    /// Header of the likelihood grid.
     pub header: Header,
-    /// The objective of the landscape.
+    /// The objective of the likelihood grid.
     pub grid_objective: ObjectiveKind,
     /// All its nodes.
     pub landscape: Landscape,
-    /// How long the run took, and the landscape, where that is recorded.
+    /// Durations of the run and of the likelihood grid, where recorded.
     pub efforts: [Option<Effort>; 2],
 }
 
 /// Why they cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum PairError {
-    /// One of them is not there, or cannot be read.
+    /// One of them is missing, or cannot be read.
     #[error(transparent)]
     Origin(#[from] OriginError),
     /// Chain or nodes cannot be read.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// The landscape is not whole.
+    /// The likelihood grid is incomplete.
     #[error("{}: {found} of {total} nodes: finish the grid first, with --resume", folder.display())]
     Unfinished {
-        /// Folder of the landscape.
+        /// Folder of the likelihood grid.
         folder: PathBuf,
-        /// Nodes there are.
+        /// Available nodes.
         found: usize,
         /// Nodes of the grid.
         total: usize,
     },
-    /// They are of different things.
+    /// They do not match.
     #[error("{} and {} do not belong together: {what}", run.display(), grid.display())]
     Different {
         /// Folder of the run.
         run: PathBuf,
-        /// Folder of the landscape.
+        /// Folder of the likelihood grid.
         grid: PathBuf,
-        /// What differs.
+        /// The difference.
         what: String,
     },
 }
 
 impl Pair {
-    /// Reads the run in folder `run` and the landscape in folder `grid`.
+    /// Reads the run in folder `run` and the likelihood grid in folder `grid`.
     ///
     /// # Errors
-    /// [`PairError`]: files that are not there or wrong, a landscape that is not whole, or of something else.
+    /// [`PairError`]: missing or wrong files, an incomplete likelihood grid, or one that does not match.
     pub fn read(run: &Path, grid: &Path) -> Result<Self, PairError> {
         let manifest = Manifest::read(run)?;
         let header = Header::read(grid)?;
@@ -91,7 +91,7 @@ impl Pair {
         Ok(Pair { manifest, settings, chain, header, grid_objective, landscape, efforts })
     }
 
-    /// Number of a sampled parameter among the axes.
+    /// Index of a sampled parameter among the axes.
     pub fn axis(&self, name: &str) -> Option<usize> {
         self.header.grid.names().position(|axis| axis == name)
     }
@@ -101,26 +101,26 @@ impl Pair {
         let axis = &self.header.grid.axes[axis];
         let free = self.settings.free.iter().find(|f| f.parameter.name() == axis.name);
         free.map_or(0.0, |f| match axis.periodic {
-            // the interval of a prior of phi may be in any turn
+            // the interval of a prior of phi may be in any cycle
             true => (-TURNS..=TURNS).map(|turn| f.prior.log_density(x + f64::from(turn)).exp()).sum::<f64>(),
             false => f.prior.log_density(x).exp(),
         })
     }
 }
 
-/// Turns of a periodic parameter from its prior to [0, 1), at most.
+/// Most cycles of a periodic parameter from its prior to [0, 1).
 const TURNS: i32 = 10;
 
-/// The first thing that keeps a run from being of the same posterior as a landscape.
+/// The first reason why a run and a likelihood grid have different posteriors.
 fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_settings: &Settings) -> Option<String> {
     let (run, grid) = (&manifest.origin, &header.origin);
     let both = |d: Difference| format!("{} ({} in the run, {} in the grid)", d.key, d.first, d.second);
     let model = |settings: &Settings| settings.imaging.objective.properties().name;
     let same_method = model(settings) == model(grid_settings);
-    // two models have images, zero points and spots of their own: they are what is compared
+    // images, jitters and spots differ between the two models: they are the subject of the comparison
     let sections = if same_method { &["star", "instrument", "imaging"][..] } else { &["star", "instrument"] };
     let model = sections.iter().find_map(|name| config::section_difference(name, &run.config, &grid.config));
-    // data of other zero points are the same data
+    // a difference in the RV jitter does not change the data
     let jitter = || config::jitter_difference(&run.config, &grid.config).filter(|_| same_method);
     if let Some(key) = model.or_else(jitter) {
         return Some(both(key));
@@ -148,7 +148,7 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     })
 }
 
-/// The first parameter that two simulations have another value of.
+/// The first parameter whose value differs between two simulations.
 fn injected(run: &Origin, grid: &Origin) -> Option<String> {
     let (first, second) = (run.truth.as_ref()?, grid.truth.as_ref()?);
     let differs = |(name, value): &(&String, &f64)| second.get(*name) != Some(*value);

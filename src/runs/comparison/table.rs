@@ -1,4 +1,4 @@
-//! The comparison as text: for each parameter a line for each estimate, then what they took, and notes.
+//! The comparison as text: for each parameter one line per estimate, then the costs, and notes.
 
 use super::{Compared, Comparison, Cost, Interval};
 use crate::numerics::text::aligned;
@@ -77,13 +77,13 @@ fn cost(cost: &Cost) -> String {
     )
 }
 
-/// Decimals that show two digits of the error bar.
+/// Decimals for two digits of the error bar.
 fn decimals(interval: &Interval) -> usize {
     let width = interval.half_width();
     if width > 0.0 && width.is_finite() { (1.0 - width.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 }
 }
 
-/// A large number by its first two digits.
+/// A large number rounded to two digits.
 fn rounded(x: f64) -> String {
     if x < 1e5 { format!("{x:.0}") } else { format!("{x:.1e}") }
 }

@@ -1,6 +1,6 @@
-//! What is exported: a run's chain, and of every parameter its name, unit, prior and injected value.
+//! The exported content: a run's chain, and the name, unit, prior and injected value of every parameter.
 //!
-//! Steps to be left out are those that `summary.json` leaves out.
+//! The omitted steps are those of `summary.json`.
 
 use super::ExportError;
 use crate::model::{FreeParameter, Prior, Quoted};
@@ -15,19 +15,19 @@ use std::path::{Path, PathBuf};
 pub struct Contents {
     /// The sampled parameters, in the order of the chain.
     pub parameters: Vec<Quantity>,
-    /// What follows from them, draw by draw.
+    /// Derived quantities, draw by draw.
     pub derived: Vec<DerivedQuantity>,
-    /// All whole steps.
+    /// All complete steps.
     pub chain: Chain,
     /// Its file.
     pub path: PathBuf,
-    /// What `analyse` says of it.
+    /// Its summary by `analyse`.
     pub summary: RunSummary,
-    /// Version of the program that the run was begun with.
+    /// Version of the program that began the run.
     pub version: String,
     /// SHA-256 (hex) of the observations.
     pub data_sha256: String,
-    /// SHA-256 (hex) of the part of the config that decides the posterior and the chain.
+    /// SHA-256 (hex) of the part of the config that determines the posterior and the chain.
     pub config_sha256: String,
     /// The config with all defaults filled in.
     pub config: Value,
@@ -54,7 +54,7 @@ pub struct Quantity {
     pub injected: Option<f64>,
 }
 
-/// A quantity that follows from the parameters of a draw.
+/// A quantity derived from the parameters of a draw.
 #[derive(Clone, Debug)]
 pub struct DerivedQuantity {
     /// The quantity, with its values at draws.
@@ -75,10 +75,10 @@ impl DerivedQuantity {
 }
 
 impl Contents {
-    /// Reads the run in a folder; it may be being written meanwhile.
+    /// Reads the run in a folder; it may still be growing.
     ///
     /// # Errors
-    /// [`ExportError`]: no run there, or one without a whole step.
+    /// [`ExportError`]: no run there, or one without a complete step.
     pub fn read(run: &Path) -> Result<Self, ExportError> {
         let manifest = Manifest::read(run)?;
         let settings = manifest.settings(run)?;
@@ -128,7 +128,7 @@ impl Contents {
         self.parameters.iter().map(|one| one.name.as_str())
     }
 
-    /// Names of the numbers beside the log-probability.
+    /// Names of the other values of a draw.
     pub fn numbers(&self) -> impl Iterator<Item = &str> {
         self.chain.shape().numbers.iter().map(String::as_str)
     }
@@ -146,7 +146,7 @@ impl Contents {
 }
 
 impl Quantity {
-    /// The value for programs that know no periods: the representative that is next to the mode.
+    /// The value for programs without periodic parameters: the representative nearest to the mode.
     pub fn unwrapped(&self, value: f64) -> f64 {
         let mut values = [value];
         if let Some(centre) = self.centre {
@@ -155,7 +155,7 @@ impl Quantity {
         values[0]
     }
 
-    /// Bounds of what [`Quantity::unwrapped`] gives.
+    /// Bounds of the result of [`Quantity::unwrapped`].
     pub fn unwrapped_bounds(&self) -> [Option<f64>; 2] {
         self.centre.map_or(self.bounds, |centre| [Some(centre - 0.5), Some(centre + 0.5)])
     }

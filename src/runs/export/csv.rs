@@ -1,7 +1,7 @@
-//! Comma-separated text for pandas and everything else: a row for each line of the chain, in the same order.
+//! Comma-separated text for pandas and other programs: one row per line of the chain, in the same order.
 //!
 //! `warmup` is true for the steps that `analyse` discards. Values are those of the chain, digit by digit; a periodic
-//! parameter is not unwrapped. `move` is empty at step 0. What follows from the parameters is in the last columns.
+//! parameter is not unwrapped. `move` is empty at step 0. Derived quantities are in the last columns.
 
 use super::place::begins_with;
 use super::{Contents, DerivedQuantity};
@@ -13,7 +13,7 @@ use std::path::Path;
 /// Columns before the parameters.
 const FIRST: [&str; 4] = ["ensemble", "step", "walker", "warmup"];
 
-/// Whether the file may be an earlier export: whether its columns begin so.
+/// Whether the file may be an earlier export: whether its first columns are these.
 pub fn is_own(file: &Path) -> bool {
     begins_with(file, FIRST.join(",").as_bytes())
 }
@@ -46,7 +46,7 @@ pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
     atomic::write(file, &table.into_bytes())
 }
 
-/// The word that the chain has for it.
+/// The word for it in the chain.
 fn word(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }

@@ -1,26 +1,25 @@
 //! The order of the draws where an ensemble is one chain: all its walkers one after the other, first the early half of
 //! each, then the late half.
 //!
-//! - R-hat and ESS of other programs compare chains, and take the draws of one to be a series in time. An ensemble is
-//!   what is independent of the others, so it is the chain.
-//! - Within it a walker's steps stay together: what a step has in common with the next shows at lag 1, 2, ..., and ESS
-//!   comes out as ensembles x walkers x steps / tau. With the walkers of a step side by side it would be at lags of 16,
-//!   32, ... (for 16 walkers), where nobody looks: sums over lags stop at the first that is negative, and ESS would be
-//!   ten times too high for a tau of 12.
-//! - Programs cut a chain into two halves, so as to see a drift. With the early half of every walker first, that cut
-//!   divides early steps from late ones, as `summary.json` does: R-hat of the two is the same. Of an odd number of
-//!   steps the middle one is early for the first half of the walkers and late for the second; `summary.json` leaves it
-//!   out.
+//! - R-hat and ESS of other programs compare chains, and treat the draws of each as a time series. Ensembles are
+//!   independent of each other, so an ensemble is a chain.
+//! - Within it a walker's steps stay together: the correlation of successive steps appears at lag 1, 2, ..., and ESS is
+//!   ensembles x walkers x steps / tau. With the walkers of a step side by side it would appear at lags of 16, 32, ...
+//!   (for 16 walkers), and be missed: sums over lags stop at the first negative one, and ESS would be ten times too
+//!   high for a tau of 12.
+//! - Programs split a chain into two halves to detect a drift. With the early half of every walker first, that split
+//!   separates early steps from late ones, as in `summary.json`: R-hat of the two is the same. For an odd number of
+//!   steps the middle one is early for the first half of the walkers and late for the second; `summary.json` omits it.
 //!
-//! What is lost: where one walker ends and another begins there are neighbours that have nothing to do with each other.
-//! That takes a share of tau / (steps / 2) from the correlation. And correlations between walkers of an ensemble at
-//! different times are not seen: the ESS of `summary.json`, from the means of whole ensembles, counts them, with more
-//! noise. In chains of 40 steps the two were found up to a factor of two apart.
+//! Limitations: where one walker ends and another begins, neighbours are independent. That reduces the correlation by a
+//! fraction of tau / (steps / 2). And correlations between walkers of an ensemble at different times are missed: the
+//! ESS of `summary.json`, from the means of whole ensembles, includes them, with more noise. In chains of 40 steps the
+//! two differed by up to a factor of two.
 
 use crate::sampling::chain::{Chain, Record};
 use std::ops::Range;
 
-/// Draws of every ensemble: places of their records among those of the chain.
+/// Draws of every ensemble: indices of their records among those of the chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draws {
     /// `[ensemble][draw]`.

@@ -3,13 +3,13 @@
 //! [walker]`.
 //!
 //! All walkers of all ensembles are side by side, those of the first ensemble first: emcee's autocorrelation time
-//! averages over walkers, and is right so. It knows of no ensembles; `chain.reshape(steps, ensembles, walkers,
-//! parameters)` has them back, and R-hat between walkers, which ArviZ gives of such a file, is not that between
-//! ensembles. The start (step 0) is no step for emcee and is left out, so that `accepted / iteration` is the acceptance
-//! fraction; the warm-up is there, and the attribute `discard` is what to give to `get_chain(discard=...)`. A periodic
-//! parameter is unwrapped around its mode.
+//! averages over walkers, and is correct for this order. It does not support ensembles; `chain.reshape(steps,
+//! ensembles, walkers, parameters)` restores them, and R-hat between walkers, which ArviZ computes from such a file, is
+//! not that between ensembles. The start (step 0) is not a step in emcee and is omitted, so that `accepted / iteration`
+//! is the acceptance fraction; the warm-up is included, and the attribute `discard` is the argument for
+//! `get_chain(discard=...)`. A periodic parameter is unwrapped around its mode.
 //!
-//! Besides emcee's own attributes there are names, units, priors and injected values.
+//! In addition to emcee's attributes there are names, units, priors and injected values.
 
 use super::place::begins_with;
 use super::{Contents, DerivedQuantity, ExportError};
@@ -21,7 +21,7 @@ use std::path::Path;
 /// The group, named as the backend expects it.
 const GROUP: &str = "mcmc";
 
-/// Version of emcee whose layout this is.
+/// Version of emcee with this layout.
 const EMCEE: &str = "3.1.6";
 
 /// Whether there is anything to write.
@@ -40,7 +40,7 @@ pub fn is_own(file: &Path) -> bool {
     begins_with(file, b"\x89HDF\r\n\x1a\n")
 }
 
-/// Writes the file, of a chain of two steps or more.
+/// Writes the file, for a chain of two steps or more.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -80,7 +80,7 @@ fn encode(contents: &Contents) -> hdf5_writer::Result<Vec<u8>> {
     file.into_plan()?.encode(WriteOptions::default())
 }
 
-/// The numbers beside the log-probability, then what follows from the parameters.
+/// The other values of a draw, then derived quantities.
 fn blob_names(contents: &Contents) -> Vec<&str> {
     contents.numbers().chain(contents.derived.iter().map(DerivedQuantity::name)).collect()
 }
@@ -89,7 +89,7 @@ fn attributes(contents: &Contents) -> hdf5_writer::Result<Vec<AttributeBuilder>>
     let chain = &contents.chain;
     let names: Vec<&str> = contents.names().collect();
     let units: Vec<&str> = contents.parameters.iter().map(|one| one.unit).collect();
-    // step s of the chain is number s - 1 here
+    // step s of the chain has index s - 1 here
     let discard = contents.summary.discarded_steps.saturating_sub(1);
     let counts = [
         ("nwalkers", chain.shape().size()),

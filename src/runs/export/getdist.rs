@@ -1,9 +1,9 @@
-//! Text files of GetDist (Lewis 2019, arXiv:1910.13970): `ROOT_1.txt`, `ROOT_2.txt`, ... with a row a draw,
+//! Text files of GetDist (Lewis 2019, arXiv:1910.13970): `ROOT_1.txt`, `ROOT_2.txt`, ... with one row per draw,
 //! `ROOT.paramnames`, `ROOT.ranges`.
 //!
 //! An ensemble is a file, so that GetDist's R-1 (variance of the files' means over mean of their variances) compares
-//! what is independent. Rows are weight (always 1), -ln P, the parameters, and as derived ones what follows from them
-//! and the numbers beside the log-probability, in the order of `draws`; the warm-up is left out, `ignore_rows` is to
+//! independent chains. Rows are weight (always 1), -ln P, the parameters, and as derived parameters the derived
+//! quantities and the other values of a draw, in the order of `draws`; the warm-up is omitted, `ignore_rows` should
 //! stay 0. `.ranges` has the bounds of the priors, `N` where there is none; a periodic parameter is unwrapped around
 //! its mode and its range is one period around that.
 
@@ -43,17 +43,17 @@ fn fill(contents: &Contents, root: &Path) -> Result<(), WriteError> {
     atomic::write(&ending(root, ".ranges"), ranges(&contents.parameters).as_bytes())
 }
 
-/// All files of an export of so many ensembles.
+/// All files of an export with so many ensembles.
 pub fn files(root: &Path, ensembles: usize) -> Vec<PathBuf> {
     let chains = (0..ensembles).map(|ensemble| chain(root, ensemble));
     chains.chain([".paramnames", ".ranges"].map(|end| ending(root, end))).collect()
 }
 
-/// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is one of ours, or the file has
-/// nothing but rows of a chain of as many numbers (an export that was interrupted).
+/// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is an export of this program, or
+/// the file contains only rows of a chain with the same number of columns (an interrupted export).
 pub fn is_own(contents: &Contents, root: &Path, file: &Path) -> bool {
     let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
-    // no other program ends the file so
+    // no other program ends the file like this
     let last = number_names(contents);
     if !last.is_empty() && read(&ending(root, ".paramnames")).ends_with(&last) {
         return true;
@@ -68,7 +68,7 @@ pub fn is_own(contents: &Contents, root: &Path, file: &Path) -> bool {
     !text.is_empty() && text.lines().all(is_row)
 }
 
-/// Whether GetDist would read other files along with those of an export, taking them for more chains: `ROOT.txt`, and
+/// Whether GetDist would read other files along with those of an export, as further chains: `ROOT.txt`, and
 /// `ROOT_N.txt` or `ROOT.N.txt` of other numbers.
 ///
 /// # Errors
@@ -93,7 +93,7 @@ pub fn check_strangers(root: &Path, ensembles: usize) -> Result<(), ExportError>
     })
 }
 
-/// Whether GetDist takes a file for a chain of the root `name`.
+/// Whether GetDist reads a file as a chain of the root `name`.
 fn is_chain(file: &str, name: &str) -> bool {
     let Some(middle) = file.strip_prefix(name).and_then(|rest| rest.strip_suffix(".txt")) else { return false };
     let number = middle.strip_prefix(['_', '.']);
@@ -124,7 +124,7 @@ fn paramnames(contents: &Contents) -> String {
     text + &number_names(contents)
 }
 
-/// Those of the numbers beside the log-probability, which come last.
+/// The same for the other values of a draw, which come last.
 fn number_names(contents: &Contents) -> String {
     let latex = |name: &str| match name {
         CHI2 => r"\chi^2".to_owned(),

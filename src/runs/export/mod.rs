@@ -1,17 +1,17 @@
-//! A chain for other programs: one format a file, all from the same [`Contents`]; and the velocities of a search for
+//! A chain for other programs: one format per file, all from the same [`Contents`]; and the velocities of a search for
 //! RV packages ([`velocities`]).
 //!
 //! | format | for | warm-up | ensembles and walkers |
 //! |---|---|---|---|
-//! | [`zarr`] | xarray, ArviZ | in groups of its own | an ensemble is a chain of all walkers in turn (`draws`) |
-//! | [`emcee`] | emcee, ArviZ | there, `discard` says how much | all walkers side by side |
-//! | [`getdist`] | GetDist | left out | an ensemble is a file |
-//! | [`csv`] | pandas and everything else | there, marked | as in the chain, a row a line |
+//! | [`zarr`] | xarray, ArviZ | in its own groups | an ensemble is a chain of all walkers in turn (`draws`) |
+//! | [`emcee`] | emcee, ArviZ | included, its length in `discard` | all walkers side by side |
+//! | [`getdist`] | GetDist | omitted | an ensemble is a file |
+//! | [`csv`] | pandas and other programs | included, marked | as in the chain, one row per line |
 //!
 //! Ensembles are independent of each other, walkers of one ensemble are not: R-hat compares ensembles. A periodic
-//! parameter is unwrapped around its mode, as in `summary.json`, for means and R-hat take no heed of periods; only csv
-//! has it as it stands in the chain. What follows from the parameters (`chain::derived`: period, times, minimum mass)
-//! goes along, draw by draw, with the values that `summary.json` is of.
+//! parameter is unwrapped around its mode, as in `summary.json`, because means and R-hat ignore periods; only csv has
+//! it as in the chain. Derived quantities (`chain::derived`: period, times, minimum mass) are included, draw by draw,
+//! with the values underlying `summary.json`.
 
 pub mod contents;
 pub mod csv;
@@ -31,12 +31,12 @@ use crate::runs::origin::OriginError;
 use crate::sampling::chain::ChainError;
 use std::path::{Path, PathBuf};
 
-/// A format that a chain can be exported in.
+/// A format for the export of a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// A Zarr store with ArviZ's groups.
     Zarr,
-    /// An HDF5 file as emcee's backend writes it.
+    /// An HDF5 file in the format of emcee's backend.
     Emcee,
     /// Text files of GetDist.
     Getdist,
@@ -45,7 +45,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Where an export goes if nothing else is said: into the run's folder, beside the chain.
+    /// The default place of an export: in the run's folder, beside the chain.
     pub fn place(self, run: &Path) -> PathBuf {
         run.join(match self {
             Format::Zarr => "chain.zarr",
@@ -66,15 +66,15 @@ pub enum ExportError {
     /// Its chain cannot be read.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// Its chain is too short for anything to be said.
+    /// Its chain is too short for a summary.
     #[error("{}: {source}", path.display())]
     Chain {
         /// The chain.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error in it.
         source: ChainError,
     },
-    /// Its chain is only the start, which the format has no place for.
+    /// Its chain is only the start, which the format does not support.
     #[error("{}: only the start of the walkers is there, and that is no step for emcee", path.display())]
     OnlyStart {
         /// The chain.
@@ -88,7 +88,7 @@ pub enum ExportError {
     Place {
         /// The place.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
     /// The export cannot be written.
@@ -96,9 +96,9 @@ pub enum ExportError {
     Write(#[from] WriteError),
 }
 
-/// Writes a run's chain to `out` in a format: a folder (zarr), a file (emcee, csv), or files whose names begin so
-/// (getdist). What an earlier export left there is replaced if `replace`, and nothing is written otherwise. Returns
-/// what was written.
+/// Writes a run's chain to `out` in a format: a folder (zarr), a file (emcee, csv), or files whose names begin like
+/// this (getdist). An earlier export there is replaced if `replace`, and nothing is written otherwise. Returns what was
+/// written.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -121,7 +121,7 @@ pub fn export(run: &Path, format: Format, out: &Path, replace: bool) -> Result<V
     write(&Contents::read(run)?, format, out, replace)
 }
 
-/// Whether the chain can be exported so, and the export may go to `out`.
+/// Whether the chain can be exported in this format, and the export may go to `out`.
 fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Result<(), ExportError> {
     let ensembles = contents.chain.shape().ensembles;
     if format == Format::Emcee {
@@ -140,7 +140,7 @@ fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Resu
     }
 }
 
-/// Files or folders that an export consists of.
+/// Files or folders of an export.
 fn targets(format: Format, ensembles: usize, out: &Path) -> Vec<PathBuf> {
     match format {
         Format::Getdist => getdist::files(out, ensembles),

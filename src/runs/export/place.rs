@@ -1,4 +1,4 @@
-//! Where an export goes: nothing that is there is lost unless it is an earlier export and the user insists.
+//! The place of an export: existing files are kept, unless they are an earlier export and the user insists.
 
 use super::ExportError;
 use crate::data::io::atomic::{Claimed, WriteError, clear_abandoned, folder_of};
@@ -24,8 +24,8 @@ pub fn check_name(out: &Path) -> Result<(), ExportError> {
     }
 }
 
-/// Whether these files can be written: none is there yet, or each that is there `is_own` and `replace`. Another file is
-/// not replaced, whatever the user says.
+/// Whether these files can be written: none exists yet, or each existing one `is_own` and `replace`. Another file is
+/// not replaced, even on request.
 pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
     for file in files {
         match file.symlink_metadata() {
@@ -39,8 +39,8 @@ pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> b
     Ok(())
 }
 
-/// Whether the folder can be written: it is not there yet, or empty, or it `is_own` and `replace`. Another one is not
-/// replaced, whatever the user says.
+/// Whether the folder can be written: it does not exist yet, or is empty, or it `is_own` and `replace`. Another one is
+/// not replaced, even on request.
 pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
     clear_abandoned(folder);
     let is_empty = || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
@@ -53,7 +53,7 @@ pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool
     }
 }
 
-/// Makes and claims the folder that the export goes into, if `check` says that it may.
+/// Makes and claims the folder of the export, if `check` allows it.
 pub fn claim_parent(out: &Path, check: impl Fn() -> Result<(), ExportError>) -> Result<Claimed, ExportError> {
     check()?;
     let folder = folder_of(out);
@@ -61,7 +61,7 @@ pub fn claim_parent(out: &Path, check: impl Fn() -> Result<(), ExportError>) -> 
     Claimed::folder(folder, check)
 }
 
-/// Whether the file begins so.
+/// Whether the file begins like this.
 pub fn begins_with(file: &Path, beginning: &[u8]) -> bool {
     let mut found = vec![0; beginning.len()];
     let read = std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut found));

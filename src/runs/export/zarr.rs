@@ -1,12 +1,12 @@
-//! A Zarr store (version 3) with the groups of ArviZ's InferenceData: `posterior`, `sample_stats`, and the same of the
+//! A Zarr store (version 3) with the groups of ArviZ's InferenceData: `posterior`, `sample_stats`, and the same for the
 //! warm-up.
 //!
-//! Dimensions are `chain` and `draw`: an ensemble is a chain, draws are in the order of `draws`, which says why; `step`
-//! and `walker` are coordinates along `draw`, so that the ensemble can be had back. `sample_stats` has what belongs to
-//! a draw and is no parameter: `lp` (ln of the posterior density), the numbers beside it, and how the draw came about,
-//! words as codes with CF's `flag_values` and `flag_meanings`. Attributes are numbers and text, JSON where there is
-//! more to say, so that xarray can also write them to netCDF. A periodic parameter is unwrapped around its mode. What
-//! follows from the parameters is in `posterior` too, with the attribute `derived`.
+//! Dimensions are `chain` and `draw`: an ensemble is a chain, draws are in the order of `draws`, which explains it;
+//! `step` and `walker` are coordinates along `draw`, so that the ensemble can be restored. `sample_stats` has the
+//! values of a draw that are not parameters: `lp` (ln of the posterior density), the other values of the evaluation,
+//! and the origin of the draw, words as codes with CF's `flag_values` and `flag_meanings`. Attributes are numbers and
+//! text, JSON for structured ones, so that xarray can also write them to netCDF. A periodic parameter is unwrapped
+//! around its mode. Derived quantities are in `posterior` too, with the attribute `derived`.
 //!
 //! Layout: <https://python.arviz.org/projects/base/en/latest/explanation/schema.html>.
 
@@ -23,7 +23,7 @@ use std::path::Path;
 /// Name of the program in the attributes.
 const PROGRAM: &str = "dimcmc";
 
-/// Key of that attribute, as ArviZ has it.
+/// Key of that attribute in ArviZ.
 const LIBRARY: &str = "inference_library";
 
 /// How evaluations end, in the order of their codes.
@@ -35,7 +35,7 @@ const STATUS: [(Status, &str); 5] = [
     (Status::NonFinite, "non-finite"),
 ];
 
-/// Writes the store, in place of an earlier one.
+/// Writes the store, replacing an earlier one.
 ///
 /// # Errors
 /// A folder that cannot be written.
@@ -59,7 +59,7 @@ pub fn is_own(folder: &Path) -> bool {
     zarr::attributes(folder).is_some_and(|attributes| attributes.get(LIBRARY) == Some(&json!(PROGRAM)))
 }
 
-/// What is known of the run.
+/// Attributes of the run.
 fn attributes(contents: &Contents) -> Attributes {
     let mut attributes = some_attributes([
         (LIBRARY, json!(PROGRAM)),
@@ -152,7 +152,7 @@ fn sample_stats(contents: &Contents, draws: &Draws) -> Group {
     group(contents, draws, arrays)
 }
 
-/// What a number beside the log-probability is.
+/// Description of another value of a draw.
 fn meaning(name: &str) -> &str {
     match name {
         SPOTTEDNESS => "spottedness of the image",

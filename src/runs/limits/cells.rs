@@ -1,17 +1,17 @@
-//! Orbits of many periods, semi-amplitudes and phases, how many of them are found, and the limits that follow.
+//! Orbits of many periods, semi-amplitudes and phases, the fraction recovered, and the resulting limits.
 
 use super::shortcut::Searches;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The orbits that are put in.
+/// The injected orbits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orbits {
     /// Periods over the rotation period, rising.
     pub porb_over_prot: Vec<f64>,
     /// Their semi-amplitudes (km/s), rising.
     pub k_kms: Vec<f64>,
-    /// Number of their phases, evenly around the circle.
+    /// Number of their phases, evenly spaced.
     pub phases: usize,
 }
 
@@ -22,15 +22,15 @@ pub struct Cell {
     pub porb_over_prot: f64,
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
-    /// Of so many phases.
+    /// Number of phases.
     pub phases: usize,
-    /// At so many the search finds a planet.
+    /// Number of those at which the search detects a planet.
     pub detected: usize,
-    /// At so many of these the planet has the right period, to half the inverse time base.
+    /// Number of these with the right period, to half the inverse time base.
     pub recovered: usize,
 }
 
-/// K from which on planets of one period are recovered.
+/// K above which planets of one period are recovered.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limit {
     /// The period (d).
@@ -50,13 +50,13 @@ impl Orbits {
     }
 }
 
-/// `count` numbers, two at least, from `low` to `high`, evenly in their logarithm.
+/// `count` values, at least two, from `low` to `high`, evenly spaced in their logarithm.
 pub fn even_in_logarithm(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| low * (high / low).powf(k as f64 / (count - 1) as f64)).collect()
 }
 
-/// All orbits by the shortcut, cells period after period with K rising; `progress` is called with the number done since
-/// the last call, from any thread.
+/// All orbits in the linearised search, cells period after period with K rising; `progress` is called with the number
+/// done since the last call, from any thread.
 pub fn recovered(searches: &Searches, orbits: &Orbits, progress: &(dyn Fn(usize) + Sync)) -> Vec<Cell> {
     let column = |porb_over_prot: &f64| {
         let search = searches.of_period(*porb_over_prot);
@@ -72,7 +72,7 @@ pub fn recovered(searches: &Searches, orbits: &Orbits, progress: &(dyn Fn(usize)
         };
         orbits.k_kms.iter().map(cell).collect::<Vec<_>>()
     };
-    // the level of a detection without an orbit, before all threads ask for it
+    // the level of a detection without an orbit, before all threads need it
     if let (Some(porb_over_prot), Some(k_kms)) = (orbits.porb_over_prot.first(), orbits.k_kms.first()) {
         searches.of_period(*porb_over_prot)(*k_kms, 0.0);
     }
@@ -91,7 +91,8 @@ pub fn limits(cells: &[Cell], rotation_period_d: f64) -> Vec<Limit> {
     cells.chunk_by(same).map(limit).collect()
 }
 
-/// The K from which on the share recovered stays at `share` or above, between the semi-amplitudes tried linear in ln K.
+/// The K above which the recovered fraction stays at `share` or above, between the semi-amplitudes tried linear in ln
+/// K.
 fn reached(column: &[Cell], share: f64) -> Option<f64> {
     let part = |cell: &Cell| cell.recovered as f64 / cell.phases as f64;
     let below = column.iter().rposition(|cell| part(cell) < share);
@@ -116,7 +117,7 @@ mod tests {
         let limit = limits(&column([0, 2, 8, 10]), 3.0)[0];
         assert!((limit.k50_kms.unwrap() - 0.2 * 2f64.sqrt()).abs() < 1e-12, "{limit:?}");
         assert!((limit.k95_kms.unwrap() - 0.4 * 2f64.powf(0.75)).abs() < 1e-12, "{limit:?}");
-        // what is lost again at larger K is not recovered
+        // not recovered if larger K are lost again
         let gap = limits(&column([5, 9, 4, 9]), 3.0)[0];
         assert!(gap.k50_kms.unwrap() > 0.4 && gap.k95_kms.is_none(), "{gap:?}");
         assert_eq!(limits(&column([10; 4]), 3.0)[0].k95_kms, Some(0.1));

@@ -1,5 +1,4 @@
-//! The files of detection limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a
-//! table.
+//! The files of detection limits: `limits.csv`, one line per period and semi-amplitude, and `limits.json`; and a table.
 
 use super::cells::{Cell, Limit, Orbits};
 use super::full::{Agreement, Comparison};
@@ -21,7 +20,7 @@ pub const CSV: &str = "limits.csv";
 /// See [`CSV`].
 pub const JSON: &str = "limits.json";
 
-/// Periods shown in the table, at most.
+/// Largest number of periods shown in the table.
 const SHOWN: usize = 12;
 
 /// The content of `limits.json`.
@@ -29,26 +28,26 @@ const SHOWN: usize = 12;
 pub struct LimitsFile {
     /// False-alarm probability of a detection.
     pub false_alarm_probability: f64,
-    /// Delta ln L of that.
+    /// Its Delta ln L.
     pub level: f64,
-    /// The orbit that was taken out of the profiles first, its K negative.
+    /// The orbit that was removed from the profiles first, its K negative.
     pub removed: Option<Orbit>,
-    /// The search of the profiles as they are, that of `periodogram`.
+    /// The search of the original profiles, that of `periodogram`.
     pub before: BeforeRecord,
-    /// The same without the orbit that was taken out; null where none was.
+    /// The same without the removed orbit; null where none was removed.
     #[serde(default)]
     pub after: Option<BeforeRecord>,
-    /// Semi-amplitudes put in (km/s).
+    /// Injected semi-amplitudes (km/s).
     pub k_kms: Vec<f64>,
     /// Number of phases.
     pub phases: usize,
-    /// Limits at the periods put in.
+    /// Limits at the injected periods.
     pub limits: Vec<Limit>,
-    /// How often the whole way agrees; null where it was not gone.
+    /// Agreement with the full pipeline; null where it was not run.
     pub agreement: Option<Agreement>,
-    /// Orbits that were tried both ways.
+    /// Orbits that were tried by both methods.
     pub comparisons: Vec<Comparison>,
-    /// What may be wrong.
+    /// Possible problems.
     pub warnings: Vec<String>,
     /// Config, data and program.
     #[serde(flatten)]
@@ -77,13 +76,13 @@ pub struct BeforeRecord {
     pub delta_ln_l: f64,
     /// Its false-alarm probability.
     pub false_alarm_probability: f64,
-    /// Number of simulations that it comes from.
+    /// Number of simulations behind it.
     #[serde(default = "usual_draws")]
     pub draws: usize,
 }
 
 impl LimitsFile {
-    /// Of the `limits` that were found.
+    /// From the `limits` that were found.
     pub fn new(
         shortcut: &Shortcut,
         orbits: &Orbits,
@@ -174,12 +173,12 @@ impl LimitsFile {
         })
     }
 
-    /// The rotation period that periods are in units of (d).
+    /// The rotation period, the unit of periods (d).
     pub fn rotation_period_d(&self) -> f64 {
         self.limits.first().map_or(f64::NAN, |limit| limit.period_d / limit.porb_over_prot)
     }
 
-    /// Medians over the periods of what would have been found.
+    /// Median limits over the periods.
     pub fn sentence(&self) -> String {
         let unit = Speeds::of(&self.k_kms);
         let typical = |of: fn(&Limit) -> Option<f64>| {
@@ -197,7 +196,7 @@ impl LimitsFile {
         )
     }
 
-    /// A table of some of the periods, and what may be wrong.
+    /// A table of some of the periods, and possible problems.
     pub fn table(&self) -> String {
         let unit = Speeds::of(&self.k_kms);
         let head = ["period_d", "porb_over_prot", &format!("K 50 % ({})", unit.name), "K 95 %"];

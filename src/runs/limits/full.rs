@@ -1,4 +1,5 @@
-//! The whole way, for a few orbits: profiles resampled with the orbit in them, imaged without a planet, and searched.
+//! The full pipeline, for a few orbits: profiles resampled with the orbit in them, imaged without a planet, and
+//! searched.
 
 use super::cells::Limit;
 use super::shortcut::{LimitSettings, Outcome, Shortcut};
@@ -17,33 +18,33 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// One orbit, both ways.
+/// One orbit by both methods.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The orbit.
     #[serde(flatten)]
     pub orbit: Orbit,
-    /// By the shortcut.
+    /// The linearised result.
     pub shortcut: Outcome,
-    /// By the whole way; `None` where the star with the orbit cannot be imaged without it.
+    /// The result of the full pipeline; `None` where the star with the orbit cannot be imaged without it.
     pub full: Option<Outcome>,
 }
 
-/// How often both ways agree.
+/// Agreement of both methods.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Agreement {
-    /// Orbits tried both ways.
+    /// Orbits tried by both methods.
     pub orbits: usize,
     /// Orbits that both recover or both miss.
     pub agree: usize,
-    /// Orbits recovered by the shortcut.
+    /// Orbits recovered in the linearised search.
     pub by_shortcut: usize,
-    /// Orbits recovered by the whole way.
+    /// Orbits recovered by the full pipeline.
     pub by_full: usize,
 }
 
 impl Agreement {
-    /// Of some comparisons.
+    /// For some comparisons.
     pub fn of(comparisons: &[Comparison]) -> Self {
         let full = |c: &Comparison| c.full.is_some_and(|full| full.recovered);
         let count = |f: &dyn Fn(&Comparison) -> bool| comparisons.iter().filter(|c| f(c)).count();
@@ -56,10 +57,10 @@ impl Agreement {
     }
 }
 
-/// How far from the limit orbits are drawn, in powers of 2 of K.
+/// Range of the drawn orbits around the limit, in powers of 2 of K.
 const REACH: f64 = 1.0;
 
-/// `count` orbits around the `limits`, where both ways are most likely to differ.
+/// `count` orbits around the `limits`, where both methods are most likely to differ.
 pub fn drawn(shortcut: &Shortcut, limits: &[Limit], count: usize) -> Vec<Orbit> {
     let mut rng = ChaCha8Rng::seed_from_u64(shortcut.settings.detection.search.seed);
     let (_, largest) = shortcut.k_range_kms().unwrap_or_default();
@@ -75,34 +76,34 @@ pub fn drawn(shortcut: &Shortcut, limits: &[Limit], count: usize) -> Vec<Orbit> 
     (0..count).map(|_| orbit()).collect()
 }
 
-/// The whole way, by what another process must know to go it: it costs seconds an orbit.
+/// The input of the full pipeline for another process: it costs seconds per orbit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WholeWay {
-    /// The config file, which paths in the config start from.
+    /// The config file, to which paths in the config are relative.
     pub config: PathBuf,
     /// The config, resolved.
     pub resolved: Value,
     /// SHA-256 (hex) of the observations.
     pub data_sha256: String,
-    /// How orbits are looked for.
+    /// The settings of the search for orbits.
     pub settings: LimitSettings,
-    /// What was taken out of the profiles.
+    /// The orbit that was removed from the profiles.
     pub removed: Option<Orbit>,
 }
 
-/// Why it cannot be gone.
+/// Why it cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum WholeWayError {
-    /// The config or the observations are not to be had.
+    /// The config or the observations are not available.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The observations are others.
+    /// The observations differ.
     #[error("{}: the observations are not those that the search began with", .0.display())]
     Changed(PathBuf),
 }
 
 impl WholeWay {
-    /// That of the star in `scene`, searched as the `shortcut` is.
+    /// For the star in `scene`, with the search of the `shortcut`.
     pub fn new(scene: &Scene, shortcut: &Shortcut) -> Self {
         WholeWay {
             config: scene.settings.path.clone(),
@@ -116,7 +117,7 @@ impl WholeWay {
     /// The star, for another process.
     ///
     /// # Errors
-    /// A config or profiles that are no longer what they were.
+    /// A config or profiles that have changed.
     pub fn scene(&self) -> Result<Scene, WholeWayError> {
         let scene = Scene::new(&Config::at(self.resolved.clone(), &self.config))?;
         match scene.data_sha256 == self.data_sha256 {
@@ -125,8 +126,8 @@ impl WholeWay {
         }
     }
 
-    /// The blind search of the profiles in `scene` with an orbit in them; `None` where they or their image make no
-    /// sense any more.
+    /// The blind search of the profiles in `scene` with an orbit in them; `None` where they or their image become
+    /// invalid.
     pub fn searcher(&self, scene: Scene) -> impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<> {
         let WholeWay { settings, removed, .. } = self.clone();
         move |orbit: &Orbit| {

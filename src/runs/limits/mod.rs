@@ -1,11 +1,11 @@
-//! Which planets the profiles would show: orbits of many periods, semi-amplitudes and phases put into them, and whether
-//! the blind search finds them.
+//! Detection limits: orbits of many periods, semi-amplitudes and phases injected into the profiles, and whether the
+//! blind search recovers them.
 //!
-//! An orbit is a shift of the profiles' velocities, in which ln L is known to second order: putting one in changes the
-//! gradient by the information times its velocities, and the search that follows costs milliseconds. What is counted as
-//! unresolved spots is found anew with every orbit, as `periodogram` would, and so is the field of spots, among some
-//! that lie on a line. On a few orbits the shortcut is held against the whole way: profiles resampled, imaged and
-//! searched.
+//! An orbit is a shift of the profiles' velocities, in which ln L is known to second order: injecting one changes the
+//! gradient by the information times its velocities, and the following search costs milliseconds. The noise by
+//! unresolved spots is fitted again with every orbit, as `periodogram` would, and so is the field of spots, among some
+//! that lie on a line. For a few orbits the linearised result is compared with the full pipeline: profiles resampled,
+//! imaged and searched.
 
 mod cells;
 mod file;

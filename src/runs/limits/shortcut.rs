@@ -1,8 +1,8 @@
-//! The blind search after an orbit has been put in, to second order around the image without a planet.
+//! The linearised blind search with an injected orbit, to second order around the image without a planet.
 //!
-//! It is that of `periodogram`: the same nuisances, and the same jitter and field of spots, which change with an orbit
-//! that is not in the model. A planet that the profiles show as they are is taken out first, with the spots as they are
-//! beside it.
+//! It is that of `periodogram`: the same nuisances, and the same jitter and field of spots, which respond to an orbit
+//! that is not in the model. A planet in the original profiles is removed first, with the spots fitted together with
+//! it.
 
 use crate::inference::detection::{Detection, DetectionSettings};
 use crate::model::{Parameter, ParameterValues};
@@ -19,32 +19,32 @@ use crate::surface::{At, Linearised, SurfaceError, SurfaceModel, WithoutJitter};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// How orbits are looked for.
+/// The settings of the search for orbits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitSettings {
     /// The blind search.
     pub detection: DetectionSettings,
     /// Its trial periods.
     pub frequencies: Frequencies,
-    /// Whether the best orbit of the profiles as they are is taken out first.
+    /// Whether the best orbit of the original profiles is removed first.
     pub best: BestOrbit,
 }
 
-/// What becomes of the best orbit of the profiles as they are.
+/// The treatment of the best orbit of the original profiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BestOrbit {
-    /// It is taken out where it is a candidate.
+    /// Removed if it is a candidate.
     OutIfCandidate,
-    /// It is taken out.
+    /// Removed.
     Out,
-    /// It stays.
+    /// Kept.
     In,
 }
 
-/// What a blind search makes of an orbit that was put in.
+/// The result of a blind search for an injected orbit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// ln L of the highest peak above no planet.
+    /// ln L of the highest peak relative to no planet.
     pub delta_ln_l: f64,
     /// Its period over the rotation period.
     pub porb_over_prot: f64,
@@ -52,12 +52,12 @@ pub struct Outcome {
     pub k_kms: f64,
     /// Whether its false-alarm probability is that of a detection.
     pub detected: bool,
-    /// Whether it has the period of the orbit, too.
+    /// Whether it also has the period of the orbit.
     pub recovered: bool,
 }
 
 impl Outcome {
-    /// Of the highest peak when an orbit of `injected` was put in.
+    /// For the highest peak when the orbit `injected` was injected.
     pub(super) fn of(highest: Highest, injected: &Orbit, time_base_cycles: f64) -> Self {
         let Highest { frequency, delta_ln_l, k_kms, level } = highest;
         let detected = delta_ln_l > level;
@@ -66,21 +66,21 @@ impl Outcome {
     }
 }
 
-/// The star without a planet, and how it is searched.
+/// The star without a planet, and the settings of its search.
 pub struct Shortcut<'a> {
-    /// How it is searched.
+    /// The settings of its search.
     pub settings: &'a LimitSettings,
-    /// What is assumed of its spots.
+    /// The assumptions on its spots.
     surface: Box<dyn SurfaceModel>,
-    /// The search of the profiles as they are.
+    /// The search of the original profiles.
     pub found: Detection,
-    /// What was taken out of the profiles: the orbit found, with the opposite sign.
+    /// The removed orbit: the orbit found, with the opposite sign.
     pub removed: Option<Orbit>,
-    /// The star that orbits are put into.
+    /// The star into which orbits are injected.
     star: Linearised,
     /// The same with fields of spots that absorb less and more of an orbit, where spots are a field.
     fields: Vec<OfField>,
-    /// What is known of its jitter.
+    /// Its jitter.
     jitter: Jitter,
     /// The search of that star.
     pub before: Search,
@@ -89,7 +89,7 @@ pub struct Shortcut<'a> {
 }
 
 impl<'a> Shortcut<'a> {
-    /// Searches the star in `imager`, all but the orbit as in `values`, and takes the planet out that is found.
+    /// Searches the star in `imager`, all but the orbit as in `values`, and removes the planet that is found.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -117,7 +117,7 @@ impl<'a> Shortcut<'a> {
                 at.values.set(Parameter::PorbOverProt, porb_over_prot);
                 at.values.set(Parameter::Phi, phi);
             }
-            // spots and jitter as they are beside the planet
+            // spots and jitter fitted together with the planet
             star = found.last().clone();
             let mut without_jitter = surface.without_jitter(at, &star)?;
             for here in std::iter::once(&mut star).chain(without_jitter.as_mut().map(|without| &mut without.here)) {
@@ -135,7 +135,7 @@ impl<'a> Shortcut<'a> {
                 put_into(held, &orbit);
             }
         }
-        // orbits are searched beside those of known planets
+        // orbits are searched with known planets in the model
         for OfField { velocities, held, .. } in &mut fields {
             *velocities = found.known.beside(velocities).into_owned();
             *held = found.known.beside(held).into_owned();
@@ -144,9 +144,9 @@ impl<'a> Shortcut<'a> {
         Ok(Shortcut { settings, surface, found, removed, star, fields, jitter, before, level })
     }
 
-    /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
-    /// the time at any period to four times the K that is found for certain at nine periods of ten. `None` where
-    /// nothing is bounded.
+    /// Semi-amplitudes (km/s) between which planets begin to be detected: from a third of the lowest K that is detected
+    /// half the time at any period to four times the K that is detected with certainty at nine periods of ten. `None`
+    /// where nothing is bounded.
     pub fn k_range_kms(&self) -> Option<(f64, f64)> {
         let rows = &self.before.rows;
         let lowest = rows.iter().filter_map(|row| row.k_limit50_kms).fold(f64::INFINITY, f64::min);
@@ -174,8 +174,8 @@ pub struct Searches<'a> {
 }
 
 impl Searches<'_> {
-    /// Those with orbits of one period over the rotation period, by semi-amplitude (km/s) and phase. Nothing is found
-    /// where no orbit is bounded.
+    /// Searches with orbits of one period over the rotation period, by semi-amplitude (km/s) and phase. Nothing is
+    /// found where no orbit is bounded.
     pub fn of_period(&self, porb_over_prot: f64) -> impl Fn(f64, f64) -> Outcome + '_ {
         let column = self.injections.as_ref().map(|injections| injections.column(porb_over_prot));
         move |k_kms, phi| {
@@ -189,15 +189,15 @@ impl Searches<'_> {
         }
     }
 
-    /// That with `orbit`.
+    /// The search with `orbit`.
     pub fn of(&self, orbit: &Orbit) -> Outcome {
         self.of_period(orbit.porb_over_prot)(orbit.k_kms, orbit.phi)
     }
 }
 
 impl Shortcut<'_> {
-    /// The highest peak with `orbit` in the profiles, where spots are no field; those that the map does not resolve may
-    /// grow with the orbit.
+    /// The highest peak with `orbit` in the profiles, where spots are not a field; unresolved spots may grow with the
+    /// orbit.
     fn without_a_field(&self, orbit: &Orbit) -> Option<Highest> {
         let LimitSettings { detection, frequencies, .. } = self.settings;
         let moved = with(&self.star.expansion, orbit);
@@ -210,19 +210,19 @@ impl Shortcut<'_> {
             orbits.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))
         };
         let trial = highest(&trials)?;
-        // at an end of the search there is no summit
+        // at an end of the search there is no maximum
         let summit = highest(&summits).filter(|summit| summit.1.delta_ln_l >= trial.1.delta_ln_l).unwrap_or(trial);
-        // the level is of draws at the trial periods, and so is what is held against it
+        // the level is from draws at the trial periods, and so is the height that is compared with it
         let (frequency, k_kms) = (summit.0, summit.1.k_kms);
         Some(Highest { frequency, delta_ln_l: trial.1.delta_ln_l, k_kms, level: self.level })
     }
 }
 
-/// Share of ln L that is lost half way between two trial frequencies, at most: with all profiles at both ends of the
+/// Largest fraction of ln L that is lost half way between two trial frequencies: with all profiles at both ends of the
 /// time base 3 %. A neighbouring season's peak has 99 % of the right one's.
 const LOST: f64 = 0.05;
 
-/// The frequencies between those of `trials` at which peaks are highest, of all that may be the highest.
+/// The frequencies between those of `trials` at which peaks are highest, for all that may be the highest.
 fn summits(trials: &[Trial]) -> Vec<f64> {
     let height = |trial: &Trial| trial.orbit.map_or(0.0, |orbit| orbit.delta_ln_l);
     let least = (1.0 - LOST) * trials.iter().map(height).fold(0.0, f64::max);
@@ -245,7 +245,7 @@ fn with(expansion: &Expansion, orbit: &Orbit) -> Expansion {
     moved
 }
 
-/// Puts `orbit` into the profiles that `quadratic` is of.
+/// Injects `orbit` into the profiles of `quadratic`.
 fn put_into(quadratic: &mut VelocityQuadratic, orbit: &Orbit) {
     let velocities = DVector::from_iterator(quadratic.len(), orbit.velocities_kms(&quadratic.cycles));
     quadratic.gradient += &quadratic.information * velocities;

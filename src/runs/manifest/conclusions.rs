@@ -1,8 +1,8 @@
-//! What a chain says when its priors and the blind search are known: which parameters it constrains at all, the modes
-//! of the period, and the verdict.
+//! Conclusions from a chain, given its priors and the blind search: the constrained parameters, the modes of the
+//! period, and the verdict.
 //!
-//! The verdict is that of the blind search. A chain takes a planet for granted, so that it can only take something
-//! away: where its K is compatible with zero, or its period is not one, a detection becomes a candidate.
+//! The verdict is that of the blind search. A chain assumes a planet, so that it can only weaken the verdict: where its
+//! K is compatible with zero, or its period has several modes, a detection becomes a candidate.
 
 use crate::data::config::Settings;
 use crate::model::{Clock, Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
@@ -18,33 +18,33 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A parameter whose 68 % interval is wider than this share of its prior's is not constrained.
+/// A parameter whose 68 % interval is wider than this fraction of its prior's is not constrained.
 const UNCONSTRAINED: f64 = 0.7;
 
 /// Modes of the period that are shown.
 const MODES_SHOWN: usize = 6;
 
-/// Draws of a prior by which its width is known, to 2 %.
+/// Draws of a prior for its width, to 2 %.
 const PRIOR_DRAWS: usize = 4001;
 
-/// What a run's chain says, and what that means for a planet; serialised, it is `summary.json`.
+/// The summary of a run's chain, and its implications for a planet; serialised, it is `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunSummary {
-    /// Of the chain.
+    /// The summary of the chain.
     #[serde(flatten)]
     pub chain: Summary,
-    /// What is said of a planet; absent where no orbit was asked for.
+    /// The verdict on a planet; absent where no orbit was searched for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
-    /// The modes of the period, from the heaviest on; empty where it was not sampled.
+    /// The modes of the period, by decreasing weight; empty where it was not sampled.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub period_modes: Vec<PeriodMode>,
-    /// What has to be known beside the verdict.
+    /// Remarks beside the verdict.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
-/// Whoever only asks for the chain finds it here.
+/// Access to the summary of the chain alone.
 impl std::ops::Deref for RunSummary {
     type Target = Summary;
 
@@ -67,7 +67,7 @@ impl RunSummary {
         verdict + &table::parameters(&self.chain, truth) + &self.modes_table() + &table::rest(&self.chain, truth)
     }
 
-    /// Whether the period has several modes, or one that spots may make.
+    /// Whether the period has several modes, or one that spots may mimic.
     pub fn has_modes_to_show(&self) -> bool {
         self.period_modes.len() > 1 || self.period_modes.iter().any(|mode| mode.rotation.is_some())
     }
@@ -95,8 +95,8 @@ impl RunSummary {
 }
 
 impl RunSummary {
-    /// Of a run by `settings` whose `chain` has this `summary`, beside the blind search; a run of the first versions
-    /// has none.
+    /// For a run by `settings` whose `chain` has this `summary`, with the blind search; a run of the first versions has
+    /// none.
     pub(super) fn of(chain: &Chain, summary: Summary, settings: &Settings, search: Option<&SearchSummary>) -> Self {
         let rotation = search.and_then(|search| search.rotation.as_ref());
         let modes = rotation.and_then(|rotation| modes(chain, summary.discarded_steps, settings, rotation));
@@ -119,7 +119,7 @@ impl RunSummary {
             if let Some(one) = of_the_chain.derived.get_mut(quantity.name()) {
                 one.unconstrained = match quantity {
                     OrbitQuantity::Period => period_is_open,
-                    // however far away the phase is counted from
+                    // however far away the origin of the phase is
                     _ => fills_turn(one, turn_d),
                 };
             }
@@ -145,7 +145,7 @@ impl RunSummary {
         summary
     }
 
-    /// What the chain has to say to the verdict of the blind search.
+    /// The effect of the chain on the verdict of the blind search.
     fn of_the_planet(&self, settings: &Settings, search: &SearchSummary) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let (is_found, rotation_period_d) = (search.verdict.finding.is_signal(), settings.star.rotation_period_d);
@@ -192,19 +192,19 @@ fn modes(chain: &Chain, discarded: usize, settings: &Settings, rotation: &Rotati
     Some(period_modes(&draws.collect::<Vec<_>>(), rotation, rotation_period_d))
 }
 
-/// Whether a time may be any of an orbit's turn (d).
+/// Whether a time is unconstrained within an orbit's period (d).
 fn fills_turn(one: &ParameterSummary, turn_d: f64) -> bool {
     one.ci68[1] - one.ci68[0] > UNCONSTRAINED * 0.68 * turn_d
 }
 
-/// Whether the posterior is about as wide as the prior, which says nothing itself: a normal one does.
+/// Whether the posterior is about as wide as the prior, unless the prior is informative: a normal one is.
 fn is_as_wide(one: &ParameterSummary, f: &FreeParameter) -> bool {
     let width = |[low, high]: [f64; 2]| match f.prior {
         Prior::LogUniform { .. } => (high / low).ln(),
         _ => high - low,
     };
     match f.prior {
-        // how much there is of an amplitude is said by its limit
+        // the limit constrains an amplitude
         _ if f.parameter.is_amplitude() => false,
         Prior::Normal { .. } => false,
         Prior::Periodic => width(one.hdi68) > UNCONSTRAINED * 0.68,
@@ -244,8 +244,8 @@ mod tests {
         }
     }
 
-    /// A phase that is counted from long before the data may be any, and the time of an event in the data known; a
-    /// period that a transit tells is no better known by the profiles, and is known.
+    /// A phase relative to a time long before the data may be unconstrained, and the time of an event in the data
+    /// constrained; a period from transits is no better constrained by the profiles, and is known.
     #[test]
     fn a_quantity_is_asked_whether_it_is_open() {
         assert!(!fills_turn(&summary([2459000.0, 2459000.15]), 5.0));

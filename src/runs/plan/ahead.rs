@@ -1,4 +1,4 @@
-//! What is planned: profiles and light curves to come, night by night.
+//! Planned profiles and light curves, night by night.
 
 use super::CampaignError;
 use crate::data::config::{Config, DataSetSettings, PlannedLight, PlannedProfiles, SEGMENT_GAP_D, Settings};
@@ -11,23 +11,23 @@ use crate::surface::photometry::{Flux, LightCurve, bin_width_d};
 use serde_json::Value;
 use std::path::Path;
 
-/// Planned profiles that are farther apart (d) are of two nights: those of one night may be hours apart.
+/// Planned profiles that are farther apart (d) belong to two nights: those of one night may be hours apart.
 const NIGHT_GAP_D: f64 = 0.5;
 
-/// What is planned for a data set.
+/// The plan for a data set.
 pub struct Ahead {
     /// Its number.
     pub set: usize,
-    /// In the order in which they are listed.
+    /// In the order of the list.
     pub profiles: Vec<Profile>,
-    /// Numbers of them.
+    /// Their indices by night.
     pub nights: Vec<Vec<usize>>,
-    /// What is measured meanwhile.
+    /// The light curve measured meanwhile.
     pub light: Option<LightCurve>,
 }
 
 impl Ahead {
-    /// Of these profiles of a data set, taken from a place if one is known.
+    /// From these profiles of a data set, with the site if it is known.
     fn new(set: usize, profiles: Vec<Profile>, site: Option<&Site>) -> Self {
         let times_d: Vec<f64> = profiles.iter().map(|profile| profile.time_d).collect();
         let nights = match site {
@@ -43,7 +43,7 @@ impl Ahead {
         Ahead { set, profiles, nights, light: None }
     }
 
-    /// Leaves the first nights; `key` is where all are listed.
+    /// Keeps only the first nights; `key` is that of the full list.
     fn truncate(&mut self, nights: usize, path: &Path, key: String) -> Result<(), CampaignError> {
         if nights > self.nights.len() {
             let (wanted, listed) = (nights, self.nights.len());
@@ -55,8 +55,8 @@ impl Ahead {
     }
 }
 
-/// The profiles of each data set of a star that is not yet observed; of times that the config lists, those of so many
-/// nights if that is `wanted`.
+/// The profiles of each data set of a star that is not yet observed; for times that the config lists, those of so many
+/// nights if `wanted`.
 pub fn simulated(
     config: &Config,
     settings: &Settings,
@@ -79,7 +79,7 @@ pub fn simulated(
     Ok(all)
 }
 
-/// What an observed star's config plans, in so many nights if that is `wanted`.
+/// The plan in an observed star's config, for so many nights if `wanted`.
 pub fn planned(
     scene: &Scene,
     settings: &Settings,
@@ -89,7 +89,7 @@ pub fn planned(
     settings.plan.iter().map(|plan| next(plan, scene, own, wanted)).collect()
 }
 
-/// The part of the config that says when profiles are taken, and in which section of it.
+/// The part of the config with the times of profiles, and its section.
 fn place(config: &Config) -> (&'static str, &'static str) {
     match config.get("plan").is_some_and(|plan| !plan.is_null()) {
         true => ("plan", ""),
@@ -106,12 +106,12 @@ fn sections<'a>(part: &'a mut Value, inner: &str) -> Vec<&'a mut Value> {
     all.into_iter().filter_map(|section| section.pointer_mut(inner)).collect()
 }
 
-/// Whether a section lists times, rather than having a schedule.
+/// Whether a section lists times, instead of having a schedule.
 fn lists_times(section: &Value) -> bool {
     ["times_d", "cycles"].iter().any(|key| section.get(key).is_some_and(|times| !times.is_null()))
 }
 
-/// Of which data sets times are listed.
+/// Which data sets list times.
 fn listed(config: &Config) -> Vec<bool> {
     let (key, inner) = place(config);
     let mut part = config.get(key).cloned().unwrap_or_default();
@@ -144,13 +144,13 @@ pub fn with_nights(config: &Config, wanted: Option<usize>) -> Result<Config, Cam
     Ok(config.clone().with(key, part))
 }
 
-/// Planned profiles like those that have been taken with their data set: bins of the last of these, and a median error
-/// where no signal-to-noise ratio is planned.
+/// Planned profiles like the existing ones of their data set: with the bins of the last of these, and a median
+/// uncertainty where no signal-to-noise ratio is planned.
 fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings, wanted: Option<usize>) -> Result<Ahead, CampaignError> {
     let PlannedProfiles { key, set, band, section } = plan;
     let taken = &scene.observations.profiles[scene.imager.profiles_of(*set)];
     let last_d = scene.observations.times_d().into_iter().fold(f64::NEG_INFINITY, f64::max);
-    // nights of a place are not those of the time scale
+    // nights of a site are not those of the time scale
     let usual_d = if section.site.is_some() { last_d + 1.0 } else { last_d.floor() + 1.0 };
     let first_d = section.first_d.unwrap_or(usual_d);
     let usual = middle(taken.iter().flat_map(|profile| profile.sigma.clone()).collect());
@@ -194,7 +194,7 @@ fn next(plan: &PlannedProfiles, scene: &Scene, own: &Settings, wanted: Option<us
         let times_d = at_cadence(own, &key, cadence_d, ends)?;
         let width_d = bin_width_d(std::slice::from_ref(&times_d), scene.imager.star.rotation_period_d);
         let fluxes: Vec<Flux> = times_d.iter().map(|time_d| Flux { time_d: *time_d, flux: 1.0, sigma }).collect();
-        // measurements farther apart are no segments of their own
+        // a longer interval between measurements does not separate segments
         let gap_d = SEGMENT_GAP_D.max(1.5 * cadence_d);
         ahead.light = Some(LightCurve::new(&key, *band, &fluxes, width_d, gap_d));
     }

@@ -1,4 +1,4 @@
-//! A star with the times at which it is to be observed.
+//! A star with the planned times of observation.
 
 use super::CampaignError;
 use super::ahead::{self, Ahead};
@@ -23,31 +23,31 @@ use serde_json::{Value, json};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Usual spots: medians of the fields that were fitted to simulated stars of nine kinds, hard-edged spots that live
-/// from 7 d to for ever (`results/calibration-changing.md`), with a break of the spectrum. Those of LO Peg have 0.25,
-/// 0.94 and 106 d, without one.
+/// Usual spots: medians of the fields that were fitted to simulated stars of nine kinds, hard-edged spots with
+/// lifetimes from 7 d to infinity (`results/calibration-changing.md`), with a break of the spectrum. Those of LO Peg
+/// have 0.25, 0.94 and 106 d, without one.
 const USUAL: (f64, f64, f64) = (0.22, 1.6, 28.0);
 
-/// A star, and when it is observed.
+/// A star, and its times of observation.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The config, resolved.
     pub settings: Settings,
-    /// Star, times, bins and noise: of each data set profiles that have been taken, then those that are planned; light
-    /// curves likewise.
+    /// Star, times, bins and noise: for each data set profiles that have been taken, then planned ones; light curves
+    /// likewise.
     pub imager: Imager,
-    /// What has been taken, spots integrated out.
+    /// The data taken, marginalised over spots.
     pub taken: Option<Arc<Marginal>>,
-    /// Numbers of what there is before the first night: profiles, and then bins of light curves, which are counted
-    /// after all profiles.
+    /// Indices of the epochs before the first night: profiles, and then bins of light curves, which are counted after
+    /// all profiles.
     pub known: Vec<usize>,
     /// Spots before the data, jitter.
     pub assumed: Assumed,
-    /// Where the spots are from.
+    /// The origin of the spots.
     pub source: SpotsSource,
-    /// Planned profiles night by night; a night of two data sets is a night of each.
+    /// Planned profiles night by night; a night with two data sets counts for each.
     pub nights: Vec<Vec<usize>>,
     /// The data sets, if there are several.
     pub sets: Vec<SetRecord>,
@@ -62,11 +62,11 @@ pub struct Campaign {
 pub struct SetRecord {
     /// Its name.
     pub name: String,
-    /// Profiles that had been taken before.
+    /// Profiles taken before.
     pub taken: usize,
-    /// Profiles that are planned.
+    /// Planned profiles.
     pub planned: usize,
-    /// In so many nights.
+    /// Number of planned nights.
     pub nights: usize,
     /// Signal-to-noise ratio of a planned bin; null where none is planned.
     pub snr: Option<f64>,
@@ -75,7 +75,7 @@ pub struct SetRecord {
 /// A light curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LightRecord {
-    /// Its name; of one that goes with planned profiles its key.
+    /// Its name; the key of one that is planned with profiles.
     pub name: String,
     /// Its bins.
     pub bins: usize,
@@ -83,20 +83,20 @@ pub struct LightRecord {
     pub planned: bool,
 }
 
-/// Where the spots that are integrated out are from.
+/// The origin of the spots that are marginalised over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpotsSource {
-    /// They were fitted to the profiles that have been taken.
+    /// They were fitted to the existing profiles.
     Fitted,
     /// The config gives amplitude, slope and lifetime.
     Given,
-    /// What the config does not give is as usual.
+    /// Usual values replace those missing in the config.
     Usual,
 }
 
 impl SpotsSource {
-    /// In words.
+    /// As text.
     pub fn words(self) -> &'static str {
         match self {
             SpotsSource::Fitted => "fitted to the profiles there are",
@@ -106,28 +106,28 @@ impl SpotsSource {
     }
 }
 
-/// What has been taken.
+/// The data taken.
 struct Taken {
     scene: Scene,
     marginal: Arc<Marginal>,
 }
 
-/// The star of a campaign: one of which profiles have been taken, or one that is simulated.
+/// The star of a campaign: one with existing profiles, or a simulated one.
 enum Star<'a> {
     Observed(&'a Taken),
     Simulated(Dataset),
 }
 
 impl Campaign {
-    /// The campaign that `config` asks for, or one for each of these numbers of `nights` (of a season).
+    /// The campaign of `config`, or one for each of these numbers of `nights` (per season).
     ///
-    /// `report` is told what is under way.
+    /// `report` is called with the current stage.
     ///
     /// # Errors
     /// [`CampaignError`].
     pub fn of(config: &Config, nights: &[usize], report: &dyn Fn(&str)) -> Result<Vec<Self>, CampaignError> {
         let own = config.settings()?;
-        // whatever the config's own objective: a plan integrates maps out
+        // whatever the config's objective: a plan marginalises over maps
         let config = &config
             .clone()
             .with("imaging.objective", "marginal-likelihood")
@@ -182,7 +182,7 @@ impl Campaign {
                 (imager, settings)
             }
         };
-        // one that is simulated beside profiles that are planned is planned, too
+        // a simulated one beside planned profiles is planned, too
         let is_known = |of: &LightCurveSettings| taken.is_some() || matches!(of.source, LightSource::File(_));
         let known_light: Vec<bool> = settings.light_curves.iter().map(is_known).collect();
         let (known, nights) = numbers(&imager, &before, &known_light, &ahead);
@@ -228,7 +228,7 @@ impl Campaign {
         })
     }
 
-    /// What profiles and light curves will say of velocities, these nuisances integrated out.
+    /// The expected constraints of profiles and light curves on velocities, marginalised over these nuisances.
     pub(super) fn planned<'a>(&'a self, nuisances: &'a [Nuisance]) -> Planned<'a> {
         let taken = self.taken.as_deref().map(|taken| (taken, &self.known[..]));
         Planned::new(&self.imager, self.settings.values, self.assumed, nuisances, taken)
@@ -240,7 +240,7 @@ impl Campaign {
         part.iter().copied().filter(|k| *k < count).collect()
     }
 
-    /// The epochs there are after some nights, with light curves up to a time (d) that may be later.
+    /// The epochs after some nights, with light curves up to a time (d) that may be later.
     pub(super) fn after(&self, nights: &[usize], light_until_d: f64) -> Vec<usize> {
         let times_d = self.imager.times_of_all_d();
         let taken = self.profiles_of(&self.known);
@@ -288,8 +288,8 @@ impl Campaign {
         self.imager.profiles().fold([f64::INFINITY, f64::NEG_INFINITY], span)
     }
 
-    /// The epochs there are after some of the nights, `looks` times as the campaign grows; before the first night too,
-    /// if profiles have been taken. Light curves that are planned grow with it.
+    /// The epochs after some of the nights, `looks` times during the campaign; before the first night too, if there are
+    /// profiles. Planned light curves grow with it.
     pub(super) fn looks(&self, looks: usize) -> Vec<(usize, Vec<usize>)> {
         let mut nights: Vec<usize> = (1..=looks).map(|k| (k * self.nights.len()).div_ceil(looks)).collect();
         if self.taken.is_some() {
@@ -325,8 +325,8 @@ fn taken(config: &Config, report: &dyn Fn(&str)) -> Result<Taken, CampaignError>
     Ok(Taken { scene, marginal: Arc::new(found.marginal) })
 }
 
-/// Numbers of what there is before the first night, so many profiles of each data set and the bins of light curves that
-/// are known; and those of planned nights, in the order of time, with their data sets.
+/// Indices of the epochs before the first night, so many profiles of each data set and the known bins of light curves;
+/// and those of planned nights, in the order of time, with their data sets.
 fn numbers(
     imager: &Imager,
     before: &[usize],
@@ -352,7 +352,7 @@ fn numbers(
     (known, nights)
 }
 
-/// A usual field, but for what is known.
+/// A usual field, except for what is known.
 fn usual(known: Known) -> Assumed {
     let (amplitude, slope, lifetime_d) = USUAL;
     let spectrum = Spectrum {

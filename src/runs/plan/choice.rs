@@ -1,8 +1,8 @@
-//! Which of the coming nights to take: those that say most of one planet, or of which of two periods is its.
+//! The choice of planned nights: those with the most information on one planet, or on which of two periods is right.
 //!
-//! Nights are taken one by one, each time the one that helps most beside those that are taken. What profiles say of an
-//! orbit is known before there are any: the information of their velocities, spots integrated out
-//! (`surface::planned`). Means over maps, where it depends on them.
+//! Nights are chosen one by one, each time the one that improves the constraints of the chosen ones most. The
+//! constraints of profiles on an orbit are known in advance: the information of their velocities, marginalised over
+//! spots (`surface::planned`). Where it depends on the maps, it is averaged over them.
 
 use super::{Campaign, PlanError, PlanSettings};
 use crate::data::ephemeris::ephemerides;
@@ -20,16 +20,16 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Maps over which information is averaged, at most: it hardly depends on them.
+/// Largest number of maps in the average: the information hardly depends on them.
 const MAPS: usize = 3;
 
 /// Random choices that are compared with the best, by their median.
 const RANDOM: usize = 5;
 
-/// Stream of the random numbers of random choices.
+/// Random-number stream of the random choices.
 const STREAM: u64 = 6;
 
-/// What nights are chosen for.
+/// The aim of the choice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "for")]
 pub enum Aim {
@@ -41,7 +41,7 @@ pub enum Aim {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         ephemeris: Option<Ephemeris>,
     },
-    /// Telling a planet of this period from one of another, any phases.
+    /// Distinguishing a planet of this period from one of another, any phases.
     Alias {
         /// Its period (d).
         period_d: f64,
@@ -50,17 +50,17 @@ pub enum Aim {
     },
 }
 
-/// What some nights come to.
+/// The figure of merit of some nights.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Merit {
-    /// Number of coming nights taken.
+    /// Number of chosen nights.
     pub nights: usize,
-    /// Standard error of K (km/s); of two periods, of the part of the orbit that the other period does not take up.
+    /// Standard error of K (km/s); for two periods, of the part of the orbit that the other period does not absorb.
     /// Null where it is not bounded.
     pub sigma_k_kms: Option<f64>,
 }
 
-/// A night that is chosen.
+/// A chosen night.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChosenNight {
     /// Data set, if there are several.
@@ -74,15 +74,15 @@ pub struct ChosenNight {
     pub sigma_k_kms: Option<f64>,
 }
 
-/// Nights chosen among those that may be taken.
+/// Nights chosen among the candidates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
-    /// For what.
+    /// The aim.
     #[serde(flatten)]
     pub aim: Aim,
-    /// Nights that they were chosen from.
+    /// Number of candidate nights.
     pub candidates: usize,
-    /// With no coming night.
+    /// Without a planned night.
     pub now: Merit,
     /// The nights, the most valuable first.
     pub chosen: Vec<ChosenNight>,
@@ -92,18 +92,18 @@ pub struct Choice {
     pub random: Vec<Merit>,
 }
 
-/// What the profiles of some nights say.
+/// The information of the profiles of some nights.
 struct Weighed<'a> {
     planned: Planned<'a>,
     maps: Vec<DMatrix<f64>>,
     campaign: &'a Campaign,
     aim: &'a Aim,
-    /// Other planets, whose K is left free.
+    /// Other planets, whose K is free.
     others: Vec<Ephemeris>,
 }
 
-/// Standard errors of K (km/s) of some nights: with a wide prior, by which nights are compared where too few are taken
-/// to bound an orbit, and as they are, infinite where it is not bounded.
+/// Standard errors of K (km/s) for some nights: with a wide prior, for comparing nights where too few are chosen to
+/// bound an orbit, and without it, infinite where it is not bounded.
 #[derive(Clone, Copy, Debug)]
 struct Sigma {
     beside_prior: f64,
@@ -114,9 +114,9 @@ struct Sigma {
 const PRIOR: f64 = 1.0;
 
 impl Weighed<'_> {
-    /// Standard errors of K with these coming nights.
+    /// Standard errors of K with these planned nights.
     fn sigma(&self, nights: &[usize]) -> Result<Sigma, FieldError> {
-        // light curves that are planned are of all nights, whichever are taken
+        // planned light curves cover all nights, whichever are chosen
         let light_until_d = if nights.is_empty() { f64::NEG_INFINITY } else { f64::INFINITY };
         let mut part = self.campaign.after(nights, light_until_d);
         part.sort_unstable();
@@ -143,7 +143,7 @@ impl Weighed<'_> {
     }
 }
 
-/// Whether two periods (d) are one.
+/// Whether two periods (d) are equal.
 pub fn is_same(a_d: f64, b_d: f64) -> bool {
     (a_d / b_d - 1.0).abs() < 1e-3
 }
@@ -155,7 +155,7 @@ impl Aim {
         *period_d
     }
 
-    /// Variance of K (km^2/s^2), averaged over phases where these are not known, beside a prior of that information
+    /// Variance of K (km^2/s^2), averaged over phases where these are not known, with a prior of that information
     /// (s^2/km^2); infinite where it is not bounded.
     fn variance(&self, quadratic: &VelocityQuadratic, rotation_period_d: f64, prior: f64) -> f64 {
         let found = match self {
@@ -178,7 +178,7 @@ impl Aim {
     }
 }
 
-/// `count` nights of the `campaign`, or all where there are fewer. `report` is told how far it is.
+/// `count` nights of the `campaign`, or all where there are fewer. `report` is called with the progress.
 ///
 /// # Errors
 /// [`PlanError::Field`].

@@ -1,4 +1,4 @@
-//! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
+//! The files of a plan: `plan.csv`, one line per schedule and period, and `plan.json`; and the printed output.
 
 use super::{Aim, Campaign, Choice, Expected, LightRecord, Outlook, PlanSettings, SetRecord, SpotsSource};
 use crate::data::io::atomic::{WriteError, write, write_json, write_set};
@@ -19,7 +19,7 @@ pub const JSON: &str = "plan.json";
 /// Periods (d) of the table, those within the search.
 const ROUND_D: [f64; 14] = [0.3, 0.5, 0.7, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0];
 
-/// Those of which sentences speak.
+/// Periods (d) of the sentences.
 const SPOKEN_D: [f64; 6] = [0.5, 2.0, 5.0, 10.0, 20.0, 50.0];
 
 /// The content of `plan.json`.
@@ -27,11 +27,11 @@ const SPOKEN_D: [f64; 6] = [0.5, 2.0, 5.0, 10.0, 20.0, 50.0];
 pub struct PlanFile {
     /// False-alarm probability of a detection.
     pub false_alarm_probability: f64,
-    /// Shortest and longest period that is searched (d).
+    /// Shortest and longest period of the search (d).
     pub range_d: [f64; 2],
-    /// How it was reckoned.
+    /// Settings of the computation.
     pub settings: PlanSettings,
-    /// The schedules, as asked for.
+    /// The schedules, in the given order.
     pub schedules: Vec<ScheduleRecord>,
     /// Number of the best of them, from 1: that with the lowest `k95_kms`.
     pub best: usize,
@@ -57,9 +57,9 @@ impl Saved for PlanFile {
 /// A schedule.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScheduleRecord {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Profiles that had been taken before.
+    /// Profiles taken before.
     pub taken: usize,
     /// First and last time (d), of all profiles.
     pub span_d: [f64; 2],
@@ -73,26 +73,26 @@ pub struct ScheduleRecord {
     /// The light curves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curves: Vec<LightRecord>,
-    /// The spots that are integrated out.
+    /// The spots that are marginalised over.
     pub spots: SpotsRecord,
     /// Delta ln L of a detection, after all nights.
     pub level: f64,
-    /// After more and more nights, all at last.
+    /// After an increasing number of nights, finally all.
     pub after: Vec<AfterRecord>,
     /// After all nights, at some round periods.
     pub periods: Vec<ExpectedRecord>,
-    /// Strong peaks of the window function, from high to low: orbits of frequency f are hard to tell from those of f
-    /// plus or minus one of these.
+    /// Strong peaks of the window function, from high to low: orbits of frequency f are hard to distinguish from those
+    /// of f plus or minus one of these.
     pub window: Vec<WindowRecord>,
-    /// The nights to be taken, where they were to be chosen.
+    /// The nights to be taken, where they were requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next: Option<Choice>,
 }
 
-/// The spots that are integrated out.
+/// The spots that are marginalised over.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpotsRecord {
-    /// Where they are from.
+    /// Their origin.
     pub source: SpotsSource,
     /// Standard deviation of the filling factor.
     pub spot_amplitude: f64,
@@ -101,18 +101,18 @@ pub struct SpotsRecord {
     /// Degree below which the spectrum is flat.
     #[serde(default)]
     pub spot_break_degree: f64,
-    /// Lifetime (d); null for spots that do not change.
+    /// Lifetime (d); null for static spots.
     pub spot_lifetime_d: Option<f64>,
-    /// Scatter of the velocity zero points (km/s).
+    /// RV jitter (km/s).
     pub velocity_jitter_kms: f64,
 }
 
-/// What there is after some nights: medians over all periods compared, up to the longest time base.
+/// The expectation after some nights: medians over all compared periods, up to the longest time base.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AfterRecord {
     /// Planned nights.
     pub nights: usize,
-    /// Profiles, those taken before among them.
+    /// Profiles, including those taken before.
     pub profiles: usize,
     /// Standard error of K (km/s); null where most periods are not bounded.
     pub sigma_k_kms: Option<f64>,
@@ -122,7 +122,7 @@ pub struct AfterRecord {
     pub k95_kms: Option<f64>,
 }
 
-/// What is expected at one period.
+/// The expectation at one period.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExpectedRecord {
     /// The period (d).
@@ -135,7 +135,7 @@ pub struct ExpectedRecord {
     pub k50_kms: Option<f64>,
     /// The same of 95 %.
     pub k95_kms: Option<f64>,
-    /// Which period of the star it is not told from, in words.
+    /// The stellar period from which it is not distinguished, as text.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imitated: Option<String>,
 }
@@ -149,11 +149,11 @@ pub struct WindowRecord {
     pub height: f64,
 }
 
-/// A campaign with what it comes to, the last of them after all nights.
+/// A campaign with its outlooks, the last of them after all nights.
 pub type Looked<'a> = (&'a Campaign, &'a [Outlook]);
 
 impl PlanFile {
-    /// Of campaigns, one at least, each with its outlooks; periods (d) at which they are compared.
+    /// From campaigns, at least one, each with its outlooks; periods (d) at which they are compared.
     pub fn new(campaigns: &[Looked], range_d: [f64; 2], compared_d: &[f64], settings: &PlanSettings) -> Self {
         let schedules: Vec<ScheduleRecord> =
             campaigns.iter().map(|looked| ScheduleRecord::new(*looked, range_d, compared_d)).collect();
@@ -196,7 +196,7 @@ impl PlanFile {
         &self.schedules[self.best - 1]
     }
 
-    /// What is printed.
+    /// The printed output.
     pub fn table(&self) -> String {
         let several = self.schedules.len() > 1;
         let mut text = if several { self.comparison() } else { String::new() };
@@ -209,7 +209,7 @@ impl PlanFile {
             text += "\n";
         }
         text += &best.table();
-        // of the first config alone
+        // for the first config only
         for (label, line) in self.provenance.measured.lines().into_iter().filter(|_| !several) {
             text += &format!("{label}: {line}\n");
         }
@@ -295,7 +295,7 @@ impl ScheduleRecord {
         self.after.last()
     }
 
-    /// Spots, and what there is after more and more nights and at some periods.
+    /// Spots, and the expectation after an increasing number of nights and at some periods.
     fn table(&self) -> String {
         let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms, .. } = self.spots;
         let lives = spot_lifetime_d.map_or("static".into(), |d| format!("lifetime {d:.1} d"));
@@ -332,7 +332,7 @@ impl ScheduleRecord {
         text + &aligned(&std::iter::once(head).chain(self.periods.iter().map(row)).collect::<Vec<_>>())
     }
 
-    /// It in plain words.
+    /// Sentences on the results.
     pub fn sentences(&self, false_alarm_probability: f64) -> Vec<String> {
         let mut sentences = Vec::new();
         for at in self.periods.iter().filter(|at| SPOKEN_D.contains(&at.period_d)) {
@@ -371,7 +371,7 @@ impl ExpectedRecord {
     fn new(expected: &Expected, rotation_period_d: f64, outlook: &Outlook) -> Self {
         let Expected { porb_over_prot, sigma_k_kms, k50_kms, k95_kms } = *expected;
         let imitation = outlook.rotation.imitated(porb_over_prot, None).filter(|imitation| imitation.is_likely());
-        // 10.000000000000002 d is what division makes of 10 d
+        // division turns 10 d into 10.000000000000002 d
         let period_d = (1e9 * rotation_period_d * porb_over_prot).round() / 1e9;
         let imitated = imitation.map(|imitation| imitation.words(rotation_period_d));
         ExpectedRecord { period_d, porb_over_prot, sigma_k_kms, k50_kms, k95_kms, imitated }
@@ -379,7 +379,7 @@ impl ExpectedRecord {
 }
 
 impl Choice {
-    /// The nights, what each adds, and what others would.
+    /// The nights, the gain by each, and the results of other choices.
     fn table(&self) -> String {
         let sigma = |kms: Option<f64>| kms.map_or_else(|| "not bounded".into(), |kms| speed(kms, 0.1 * kms));
         let several = self.chosen.iter().any(|night| night.set.is_some());

@@ -1,4 +1,4 @@
-//! A whole plan: the schedules of several configs, compared.
+//! A complete plan: the schedules of several configs, compared.
 
 use super::choice::{choose, is_same};
 use super::{Aim, Campaign, CampaignError, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d};
@@ -10,25 +10,25 @@ use crate::numerics::text::shown;
 use crate::planets::periodogram::{FrequencyError, FrequencySettings};
 use std::path::Path;
 
-/// What schedules will show, each with its outlooks.
+/// Forecasts of schedules, each with its outlooks.
 pub struct Forecast {
     campaigns: Vec<(Campaign, Vec<Outlook>)>,
     file: PlanFile,
 }
 
-/// Nights that are to be chosen.
+/// The request for a choice of nights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Next {
-    /// How many.
+    /// Their number.
     pub nights: usize,
     /// Period of the planet (d); that of the config, if it is not given.
     pub period_d: Option<f64>,
-    /// Another period (d) that it is to be told from.
+    /// Another period (d) from which it is to be distinguished.
     pub other_d: Option<f64>,
 }
 
 impl Next {
-    /// What the nights of a campaign are chosen for.
+    /// The aim of the choice of nights for a campaign.
     fn aim(&self, campaign: &Campaign) -> Result<Aim, ConfigError> {
         let settings = &campaign.settings;
         let is_wanted = |known: &Ephemeris| self.period_d.is_none_or(|wanted_d| is_same(wanted_d, known.period_d[0]));
@@ -68,18 +68,17 @@ pub enum ForecastError {
     TooFewTimes {
         /// The configs.
         configs: String,
-        /// How few.
+        /// The error in their number.
         source: FrequencyError,
     },
-    /// A schedule cannot be looked at.
+    /// A schedule cannot be evaluated.
     #[error(transparent)]
     Plan(#[from] PlanError),
 }
 
 impl Forecast {
-    /// Of the schedules in `configs`, one at least; of each as many as there are numbers of `nights`, if any are given;
-    /// of each the `next` nights, where that is asked for.
-    /// `report` is told what is under way.
+    /// For the schedules in `configs`, at least one; for each as many as there are numbers of `nights`, if any are
+    /// given; for each the `next` nights, where requested. `report` is called with the current stage.
     ///
     /// # Errors
     /// [`ForecastError`].
@@ -132,7 +131,7 @@ impl Forecast {
         self.file.write(&looked(&self.campaigns), folder)
     }
 
-    /// What is printed.
+    /// The printed output.
     pub fn table(&self) -> String {
         self.file.table()
     }

@@ -1,13 +1,13 @@
-//! What profiles that are not yet taken will say of planets.
+//! Expected constraints of planned profiles on planets.
 //!
-//! In: configs, each a star with a schedule ([`Campaign`]): `observations.simulate` of a star that is not yet observed,
-//! or observed profiles with a `plan`. Out: for each the error of K, and the K that is detected, at every period, after
-//! every few nights ([`Outlook`]); and which of the schedules is best ([`PlanFile`]). The order:
-//! 1. Maps are drawn from the field of spots, given the profiles that there are, and the profiles made linear at them.
-//! 2. The information that these hold of the orbit's velocities, spots integrated out (`surface::evolving_map`).
-//! 3. Errors, false alarms and limits follow from it as for observed profiles (`planets::periodogram`). Of what differs
-//!    from map to map the median is taken.
-//! 4. On request the nights are [chosen](Choice) that say most of one planet.
+//! In: configs, each a star with a schedule ([`Campaign`]): `observations.simulate` for a star that is not yet
+//! observed, or observed profiles with a `plan`. Out: for each the uncertainty of K, and the K that is detected, at
+//! every period, after every few nights ([`Outlook`]); and which of the schedules is best ([`PlanFile`]). The order:
+//! 1. Maps are drawn from the field of spots, given the existing profiles, and the profiles are linearised at them.
+//! 2. Their information on the orbit's velocities is marginalised over spots (`surface::evolving_map`).
+//! 3. Uncertainties, false-alarm probabilities and limits follow from it as for observed profiles
+//!    (`planets::periodogram`), with medians over the maps.
+//! 4. On request the nights with the most information on one planet are [chosen](Choice).
 
 mod ahead;
 mod campaign;
@@ -32,50 +32,50 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Periods over which schedules are compared, even in their logarithm.
+/// Number of periods at which schedules are compared, evenly spaced in their logarithm.
 const COMPARED: usize = 60;
 
 /// Profiles and bins of light curves of the largest campaign: some minutes, and 1 GB.
 const MOST_PROFILES: usize = 1000;
 
-/// How often the growing campaign is looked at.
+/// Number of evaluations during the campaign.
 const LOOKS: usize = 6;
 
-/// How a plan is reckoned.
+/// Settings of the computation of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanSettings {
-    /// Maps that are drawn; 0 for a star without spots in place of them.
+    /// Number of drawn maps; 0 for an unspotted star instead.
     pub maps: usize,
-    /// Stars without a planet of which false alarms are taken.
+    /// Number of planet-free Monte Carlo realisations for the FAP.
     pub draws: usize,
     /// Seed of both.
     pub seed: u64,
-    /// Whether systemic velocity and stellar parameters are those of the config, rather than integrated out.
+    /// Whether systemic velocity and stellar parameters are fixed at the config's values, instead of marginalised over.
     pub fixed: bool,
 }
 
 /// Why there is no campaign.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The config or its observations are at fault.
+    /// The config or its observations are wrong.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The spots of the observed profiles cannot be integrated out.
+    /// The spots of the observed profiles cannot be marginalised over.
     #[error("{}: no field of spots fits the observed profiles: {source}", path.display())]
     Field {
         /// The config.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         source: NoFit,
     },
-    /// More nights are asked for than there are.
+    /// More nights are requested than there are.
     #[error("--nights {wanted}: {}: {key} lists {listed} nights", path.display())]
     Nights {
         /// The config.
         path: PathBuf,
         /// The key of its nights.
         key: String,
-        /// Nights asked for.
+        /// Requested nights.
         wanted: usize,
         /// Nights of the config.
         listed: usize,
@@ -91,15 +91,15 @@ impl From<ConfigError> for CampaignError {
 /// Why there is no plan.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The field cannot be integrated out.
+    /// The field cannot be marginalised over.
     #[error("{name}: {source}")]
     Field {
         /// The schedule.
         name: String,
-        /// What is wrong.
+        /// The error.
         source: FieldError,
     },
-    /// More profiles than can be looked at in reasonable time and memory.
+    /// More profiles than can be evaluated in reasonable time and memory.
     #[error(
         "{name}: {profiles} profiles and bins of light curves; time and memory of a plan grow with their square, and \
         {MOST_PROFILES} are the most: fewer --nights, fewer exposures per_night, or no photometry over so long a time"
@@ -107,15 +107,15 @@ pub enum PlanError {
     TooLong {
         /// The schedule.
         name: String,
-        /// How many.
+        /// Their number.
         profiles: usize,
     },
-    /// Periods that make no sense, or too few profiles.
+    /// Invalid periods, or too few profiles.
     #[error(transparent)]
     Frequencies(#[from] FrequencyError),
 }
 
-/// Shortest and longest period (d) at which all of the campaigns are looked at.
+/// Shortest and longest period (d) at which all of the campaigns are evaluated.
 ///
 /// # Errors
 /// [`FrequencyError`].
@@ -129,8 +129,8 @@ pub fn range_d(campaigns: &[Campaign], wanted: FrequencySettings) -> Result<[f64
     Ok(range)
 }
 
-/// What a campaign comes to, searched from the shortest to the longest period of `range_d`. `report` is told how far it
-/// is.
+/// The outlooks of a campaign, searched from the shortest to the longest period of `range_d`. `report` is called with
+/// the progress.
 ///
 /// # Errors
 /// [`PlanError`].

@@ -1,4 +1,4 @@
-//! Errors of K, and the K that is detected, of profiles of which the information is known.
+//! Uncertainties of K, and the K that is detected, for profiles with known information.
 
 use super::PlanSettings;
 use crate::planets::periodogram::limits::detection_limit_kms;
@@ -10,26 +10,26 @@ use crate::planets::verdict::CANDIDATE_FAP;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// What profiles say after some nights.
+/// The constraints of profiles after some nights.
 #[derive(Clone, Debug)]
 pub struct Outlook {
-    /// Nights that were planned and have passed.
+    /// Planned nights that have passed.
     pub nights: usize,
-    /// Profiles, those that had been taken before among them.
+    /// Profiles, including those taken before.
     pub profiles: usize,
     /// Trial periods of the search.
     pub frequencies: Frequencies,
     /// Delta ln L of a false-alarm probability of [`CANDIDATE_FAP`].
     pub level: f64,
-    /// Peaks of the window function, which make aliases.
+    /// Peaks of the window function, which cause aliases.
     pub window: Vec<WindowPeak>,
     /// The star's own periods.
     pub rotation: RotationPeriods,
-    /// Of each map.
+    /// One for each map.
     quadratics: Vec<VelocityQuadratic>,
 }
 
-/// What is expected at one period: medians over the maps.
+/// The expectation at one period: medians over the maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
     /// Period over the rotation period.
@@ -44,7 +44,7 @@ pub struct Expected {
 }
 
 impl Outlook {
-    /// Of the quadratics of some maps, one at least.
+    /// From the quadratics of some maps, at least one.
     pub(super) fn new(
         nights: usize,
         profiles: usize,
@@ -63,13 +63,13 @@ impl Outlook {
         Outlook { nights, profiles, frequencies, level, window, rotation, quadratics }
     }
 
-    /// What is expected at all trial periods.
+    /// The expectation at all trial periods.
     pub fn everywhere(&self) -> Vec<Expected> {
         let per_cycle: Vec<f64> = self.frequencies.per_cycle.iter().rev().copied().collect();
         self.at(&per_cycle)
     }
 
-    /// The same at some frequencies (orbits a rotation cycle).
+    /// The same at some frequencies (orbits per rotation cycle).
     pub fn at(&self, frequencies: &[f64]) -> Vec<Expected> {
         let of_maps: Vec<Vec<[Option<f64>; 3]>> = self
             .quadratics
@@ -84,7 +84,7 @@ impl Outlook {
         frequencies.iter().enumerate().map(expected).collect()
     }
 
-    /// Medians over periods (orbits a rotation cycle), those at which no orbit is bounded counted as the worst.
+    /// Medians over periods (orbits per rotation cycle), with those at which no orbit is bounded counted as the worst.
     pub fn typical(&self, frequencies: &[f64]) -> Expected {
         let all = self.at(frequencies);
         let over = |number: fn(&Expected) -> Option<f64>| median(all.iter().map(number).collect());
@@ -114,7 +114,7 @@ fn mean(quadratics: &[VelocityQuadratic]) -> VelocityQuadratic {
     VelocityQuadratic { cycles: quadratics[0].cycles.clone(), gradient: DVector::zeros(n), information }
 }
 
-/// What is missing is larger than all else.
+/// Missing values count as larger than all others.
 fn median(values: Vec<Option<f64>>) -> Option<f64> {
     let n = values.len();
     let mut known: Vec<f64> = values.into_iter().flatten().filter(|x| x.is_finite()).collect();

@@ -4,9 +4,9 @@ use crate::runs::limits::Outcome;
 use crate::sampling::log_density::{Evaluation, Status};
 use crate::star::Orbit;
 
-/// What is asked, as bytes.
+/// A question that can be encoded as bytes.
 pub trait Question: Sync {
-    /// As bytes.
+    /// Encodes it.
     fn to_bytes(&self) -> Vec<u8>;
 }
 
@@ -17,30 +17,30 @@ impl Question for Vec<f64> {
     }
 }
 
-/// What is answered, as bytes and back.
+/// An answer that can be encoded as bytes and decoded.
 pub trait Answer: Send + Sized {
-    /// As bytes.
+    /// Encodes it.
     fn to_bytes(&self) -> Vec<u8>;
 
-    /// Back; `None` if they are not what `to_bytes` makes.
+    /// Decodes it; `None` for bytes that are not from `to_bytes`.
     fn from_bytes(bytes: &[u8]) -> Option<Self>;
 }
 
-/// An orbit to be put into profiles.
+/// An orbit to be injected into profiles.
 impl Question for Orbit {
     fn to_bytes(&self) -> Vec<u8> {
         numbers_to_bytes(&[self.k_kms, self.porb_over_prot, self.phi])
     }
 }
 
-/// The orbit of a question; `None` if it is none.
+/// The orbit of a question; `None` for other bytes.
 #[cfg(feature = "mpi")]
 pub fn orbit_from_bytes(bytes: &[u8]) -> Option<Orbit> {
     let [k_kms, porb_over_prot, phi] = *numbers_from_bytes(bytes).first_chunk()?;
     Some(Orbit { k_kms, porb_over_prot, phi })
 }
 
-/// What became of it; nothing where it could not be searched for.
+/// The result of its search; `None` where it could not be searched for.
 impl Answer for Option<Outcome> {
     fn to_bytes(&self) -> Vec<u8> {
         let truth = |is: bool| f64::from(u8::from(is));
@@ -61,7 +61,7 @@ impl Answer for Option<Outcome> {
     }
 }
 
-/// All of them; the place is the number on the way, which is exact.
+/// All of them; the index is the encoded number, which is exact.
 const STATUS: [Status; 5] =
     [Status::Converged, Status::Unreachable, Status::OutsidePrior, Status::StoppedShort, Status::NonFinite];
 
@@ -85,7 +85,7 @@ fn numbers_to_bytes(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// Back; what is left over of a broken end is dropped.
+/// The inverse; incomplete bytes at the end are dropped.
 pub(super) fn numbers_from_bytes(bytes: &[u8]) -> Vec<f64> {
     bytes.as_chunks().0.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect()
 }

@@ -1,8 +1,8 @@
 //! Evaluates batches of parameter vectors on threads or MPI ranks. Answers are in the order of the questions; results
 //! are independent of the backend.
 //!
-//! `target` passes a vector to the density of the surface model, `task` what another process must know to evaluate the
-//! same to the bit, `message` questions and answers as bytes.
+//! `target` passes a vector to the density of the surface model, `task` is the input with which another process
+//! evaluates the same to the bit, `message` encodes questions and answers as bytes.
 
 mod message;
 mod target;
@@ -21,8 +21,8 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
 
-/// Who reconstructs, until they are told to stop: no reconstruction is begun after that, and those under way are
-/// finished.
+/// The backend of reconstructions, until it is told to stop: no reconstruction is begun after that, and current ones
+/// are finished.
 #[derive(Default)]
 pub struct Pool {
     stop: Arc<AtomicBool>,
@@ -51,7 +51,7 @@ impl Pool {
         Pool { stop, workers: Workers::Ranks(queue) }
     }
 
-    /// How many reconstructions are under way at once.
+    /// Number of concurrent reconstructions.
     pub fn size(&self) -> usize {
         match &self.workers {
             Workers::Threads => rayon::current_num_threads(),
@@ -60,12 +60,12 @@ impl Pool {
         }
     }
 
-    /// Whether other processes work, too, and may end the job.
+    /// Whether other processes are involved, and may end the job.
     pub fn is_of_ranks(&self) -> bool {
         !matches!(self.workers, Workers::Threads)
     }
 
-    /// Set from outside to stop.
+    /// Set by the caller to stop.
     pub fn stop(&self) -> &AtomicBool {
         &self.stop
     }
@@ -75,13 +75,13 @@ impl Pool {
         Arc::clone(&self.stop)
     }
 
-    /// Whether they were told to stop.
+    /// Whether it was told to stop.
     pub fn stopped(&self) -> bool {
         self.stop.load(Relaxed)
     }
 
-    /// The answers to the first questions: to all, unless told to stop meanwhile. Other processes work by `brief` (a
-    /// [`Brief`] as bytes), this one by `here`, which is the same.
+    /// The answers to the first questions: to all, unless told to stop meanwhile. Other processes use `brief` (a
+    /// [`Brief`] as bytes), this one uses `here`, which is equivalent.
     pub fn answers<Q: Question, A: Answer>(
         &self,
         brief: &[u8],
@@ -89,7 +89,7 @@ impl Pool {
         here: impl Fn(&Q) -> A + Sync,
     ) -> Vec<A> {
         self.by_ranks_or(brief, questions, || {
-            // threads see the flag alone: what is MPI's stays on this one
+            // threads see only the flag: MPI stays on this one
             let stop = self.stop();
             let answer = |question| (!stop.load(Relaxed)).then(|| here(question));
             let all: Vec<Option<A>> = questions.par_iter().with_max_len(1).map(answer).collect();
@@ -97,8 +97,8 @@ impl Pool {
         })
     }
 
-    /// The same for questions that take batches of their own to answer: one thread each, and no thread that waits for a
-    /// batch takes up another question meanwhile, as rayon's would.
+    /// The same for questions that require their own batches: one thread each, and no thread that waits for a batch
+    /// takes another question meanwhile, as rayon's would.
     pub fn answers_apart<Q: Question, A: Answer + Sync>(
         &self,
         brief: &[u8],
@@ -152,7 +152,7 @@ pub struct Evaluations<'a> {
 }
 
 impl<'a> Evaluations<'a> {
-    /// Of `target`, which others know by `task`.
+    /// For `target`, which other processes receive as `task`.
     pub fn new(pool: &'a Pool, target: &'a Target, task: &Task) -> Self {
         Evaluations {
             pool,
@@ -162,7 +162,7 @@ impl<'a> Evaluations<'a> {
         }
     }
 
-    /// How many there were.
+    /// Their number.
     pub fn count(&self) -> usize {
         self.count.load(Relaxed)
     }

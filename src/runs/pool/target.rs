@@ -1,4 +1,4 @@
-//! What a run samples: the posterior, with unresolved spots counted as noise or not where one map counts.
+//! The density that a run samples: the posterior, for one map with unresolved spots counted as noise or not.
 
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
 use crate::surface::UnresolvedSpots;
@@ -7,22 +7,23 @@ use crate::surface::surrogate::Surrogate;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// The density that is sampled.
+/// The sampled density.
 pub struct Target {
     posterior: Density,
-    /// Of the surrogates' kind, before it is fitted; none where there is none.
+    /// The surrogate of the density before it is fitted; `None` where there is none.
     surrogate: Option<Surrogate>,
 }
 
-/// Draws of the surrogate that stand for where a chain goes.
+/// Draws of the surrogate that represent the region of a chain.
 const DRAWS: usize = 200;
 
-/// Evaluations that a chain is expected to take at least.
+/// Smallest expected number of evaluations of a chain.
 const EVALUATIONS: usize = 3000;
 
 impl Target {
-    /// Of `posterior`, unresolved spots taken as the config says, with warm starts where the surrogate says that a
-    /// chain goes: a function of posterior and config alone, so that a resumed run, or another process, has the same.
+    /// From `posterior`, with unresolved spots according to the config, and with warm starts in the region that the
+    /// surrogate predicts for a chain: a function of posterior and config alone, so that a resumed run, or another
+    /// process, has the same.
     ///
     /// # Errors
     /// [`UnresolvedSpotsError`].
@@ -41,7 +42,7 @@ impl Target {
         &self.posterior
     }
 
-    /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density
+    /// The surrogate, if there is one, and the fraction of its proposals accepted in a test: a function of the density
     /// alone, so that a resumed run has the same.
     pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {
         let surrogate = self.surrogate.clone()?;

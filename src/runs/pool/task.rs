@@ -1,6 +1,6 @@
-//! What another process must know to evaluate the same density to the bit: what the computation was begun with.
+//! The input with which another process evaluates the same density to the bit: the origin of the computation.
 //!
-//! It builds scene, reference and density as a resumed computation does, and with the same checks.
+//! It builds scene, reference and density like a resumed computation, and with the same checks.
 
 use super::message::{Answer as _, numbers_from_bytes};
 use super::target::Target;
@@ -14,52 +14,52 @@ use crate::surface::density::UnresolvedSpotsError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// What others are told before they are asked.
+/// The brief for other processes before their questions.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Brief {
     /// Questions are parameter vectors.
     Density(Box<Task>),
     /// Questions are stars of a batch.
     Stars,
-    /// Questions are orbits that are put into profiles.
+    /// Questions are orbits that are injected into profiles.
     Injections(Box<WholeWay>),
 }
 
-/// A density, by what it was begun with.
+/// A density, by its origin.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Task {
-    /// The config file, which paths in the config start from.
+    /// The config file, to which paths in the config are relative.
     pub config: PathBuf,
     /// Config, data and reference.
     pub origin: Origin,
     /// Names of the free parameters.
     pub free: Vec<String>,
-    /// What of it.
+    /// The requested quantity.
     pub asked: Asked,
 }
 
-/// What is asked for at a parameter vector.
+/// The requested quantity at a parameter vector.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Asked {
     /// The log-probability that a chain samples.
     LogProbability,
-    /// The likelihood of a landscape.
+    /// The likelihood of a likelihood grid.
     Likelihood {
-        /// Where evaluations start, besides the reference.
+        /// Starts of evaluations, besides the reference.
         warm_starts: Vec<Vec<f64>>,
     },
 }
 
-/// Why a process cannot evaluate what it is asked to.
+/// Why a process cannot evaluate its questions.
 #[derive(Debug, thiserror::Error)]
 pub enum TaskError {
-    /// Config or observations are not to be had there.
+    /// Config or observations are not available there.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// They are others, or the reference is.
+    /// They differ, or the reference does.
     #[error(transparent)]
     Origin(#[from] OriginError),
-    /// Orbits cannot be put in there.
+    /// Orbits cannot be injected there.
     #[error(transparent)]
     Injections(#[from] WholeWayError),
     /// Unresolved spots have no size there.
@@ -71,19 +71,19 @@ pub enum TaskError {
 pub type Answerer = Box<dyn Fn(&[u8]) -> Vec<u8> + Send + Sync>;
 
 impl Brief {
-    /// As bytes.
+    /// Encodes it.
     pub fn to_bytes(&self) -> Vec<u8> {
         serde_json::to_vec(self).expect("plain data")
     }
 
-    /// Back; `None` if they are not what `to_bytes` makes.
+    /// Decodes it; `None` for bytes that are not from `to_bytes`.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         serde_json::from_slice(bytes).ok()
     }
 }
 
 impl Task {
-    /// The task of what began in `scene` with `origin`.
+    /// The task of a computation that began in `scene` with `origin`.
     pub fn new(scene: &Scene, origin: &Origin, free: &[String], asked: Asked) -> Self {
         Task { config: scene.settings.path.clone(), origin: origin.clone(), free: free.to_vec(), asked }
     }
@@ -91,7 +91,7 @@ impl Task {
     /// Builds the density.
     ///
     /// # Errors
-    /// [`TaskError`]: data that are missing or others here, a reference that comes out differently.
+    /// [`TaskError`]: data that are missing or differ here, a reference that differs.
     pub fn answerer(&self) -> Result<Answerer, TaskError> {
         let scene = Scene::new(&Config::at(self.origin.config.clone(), &self.config))?;
         let place = self.config.as_path();

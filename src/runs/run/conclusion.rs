@@ -1,4 +1,4 @@
-//! What is said of a run once it has ended, or meanwhile: its summary, and the text that goes with it.
+//! The conclusion of a finished or unfinished run: its summary, and the corresponding text.
 
 use super::{CHAIN, RunError, SUMMARY, read_chain};
 use crate::data::io::atomic::write_json;
@@ -10,9 +10,9 @@ use std::path::Path;
 /// Summary and text.
 #[derive(Clone, Debug)]
 pub struct Conclusion {
-    /// What `summary.json` holds.
+    /// The content of `summary.json`.
     pub summary: RunSummary,
-    /// The verdict, the table of the parameters, and notes: what `dimcmc analyse` prints.
+    /// The verdict, the table of the parameters, and notes: the output of `dimcmc analyse`.
     pub text: String,
     kinds: Vec<ParameterKind>,
     settled: Vec<Settled>,
@@ -29,10 +29,10 @@ impl Conclusion {
         Ok((Conclusion::of(folder, &manifest, &chain)?, chain))
     }
 
-    /// Of a chain in `folder`, which errors name.
+    /// For a chain in `folder`, the name in errors.
     ///
     /// # Errors
-    /// A config that this version does not understand, a chain without a step.
+    /// A config that this version does not support, a chain without a step.
     #[doc(hidden)]
     pub fn of(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<Self, RunError> {
         let settings = manifest.settings(folder)?;
@@ -46,8 +46,8 @@ impl Conclusion {
         Ok(Conclusion { summary, text, kinds, settled })
     }
 
-    /// The draws of every parameter and of every quantity that follows from them, by name: those of `chain`, whose
-    /// conclusion this is, in its order and without the steps left out. Phases are unwrapped around their mode.
+    /// The draws of every parameter and of every derived quantity, by name: those of `chain`, the chain of this
+    /// conclusion, in its order and without the omitted steps. Phases are unwrapped around their mode.
     pub fn draws(&self, chain: &Chain) -> Vec<(String, Vec<f64>)> {
         let kept = || chain.records().iter().skip(self.summary.discarded_steps * chain.shape().size());
         let parameter = |(k, name): (usize, &String)| {

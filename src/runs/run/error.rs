@@ -1,4 +1,4 @@
-//! Why a run cannot begin, or go on.
+//! Why a run cannot begin or be resumed.
 
 use crate::data::config::ConfigError;
 use crate::data::io::atomic::WriteError;
@@ -13,20 +13,20 @@ use std::path::PathBuf;
 /// Draws from the prior tried for one walker.
 pub(super) const PRIOR_TRIES: usize = 100;
 
-/// Why a run cannot begin, or go on.
+/// Why a run cannot begin or be resumed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// The config does not ask for a chain, or makes no sense.
+    /// The config does not describe a chain, or is invalid.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The search for the best parameters led nowhere.
+    /// The search for the best parameters failed.
     #[error(transparent)]
     Search(#[from] SearchError),
-    /// The start is no start, or the sampler's settings are wrong.
+    /// The start is invalid, or the sampler's settings are wrong.
     #[error(transparent)]
     Ensemble(#[from] EnsembleError),
-    /// A walker found no place in the prior where a reconstruction succeeds.
+    /// A walker found no point in the prior where a reconstruction succeeds.
     #[error(
         "start from the prior: no reconstruction succeeds at {} draws; narrow the priors under `parameters`",
         PRIOR_TRIES
@@ -35,13 +35,13 @@ pub enum RunError {
     /// The unresolved spots have no size that fits.
     #[error(transparent)]
     UnresolvedSpots(#[from] UnresolvedSpotsError),
-    /// Several runs joined have no common random numbers to go on with.
+    /// Merged runs have no common random numbers to continue with.
     #[error("{}: a merged run: extend its runs, then merge again", .0.display())]
     Merged(PathBuf),
-    /// It was stopped before there was anything to write.
+    /// It was stopped before anything was written.
     #[error("interrupted before the first step; nothing was written")]
     Interrupted,
-    /// What the run was begun with is missing, wrong, or not what is there now.
+    /// The manifest of the run is missing, wrong, or does not match.
     #[error(transparent)]
     Origin(#[from] OriginError),
     /// The chain on disk is wrong or locked.
@@ -50,7 +50,7 @@ pub enum RunError {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The folder cannot be made, or not cleared.
+    /// The folder cannot be created or cleared.
     #[error("{}: {source}", path.display())]
     Folder {
         /// The folder.
@@ -58,7 +58,7 @@ pub enum RunError {
         /// Why.
         source: std::io::Error,
     },
-    /// The chain on disk says nothing.
+    /// The chain on disk has no summary.
     #[error("{}: {source}", path.display())]
     Analysis {
         /// The chain.
@@ -66,7 +66,7 @@ pub enum RunError {
         /// Why.
         source: ChainError,
     },
-    /// The chain refused a step: a fault of the program.
+    /// The chain refused a step: a bug.
     #[error(transparent)]
     Chain(#[from] ChainError),
 }

@@ -1,7 +1,7 @@
-//! A sampling run: search, start, chain, in memory or on disk; begun afresh or resumed to the same bytes.
+//! A sampling run: search, start, chain, in memory or on disk; begun or resumed to the same bytes.
 //!
-//! Its files: `manifest.json`, `chain.jsonl` (each step, by `data::io::journal`) and `summary.json`. `start` is where
-//! the walkers begin, `pace` how far they have come, `conclusion` what is said in the end.
+//! Its files: `manifest.json`, `chain.jsonl` (each step, by `data::io::journal`) and `summary.json`. `start` is the
+//! start of the walkers, `pace` the progress, `conclusion` the summary at the end.
 
 mod conclusion;
 mod error;
@@ -35,18 +35,18 @@ use std::time::{Duration, Instant};
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
 
-/// Name of its analysis.
+/// Name of its summary.
 pub const SUMMARY: &str = "summary.json";
 
-/// Whether nothing but an empty chain is in `folder`, and with `manifest` perhaps that: such a run may begin again.
+/// Whether `folder` contains only an empty chain, and the manifest if `manifest` is set: such a run may begin again.
 pub fn is_false_start(folder: &Path, manifest: bool) -> bool {
     lines::is_false_start(folder, manifest.then_some(manifest::FILE), CHAIN)
 }
 
-/// Reads the chain of the run in `folder`, which may be being written meanwhile, and checks it as a whole.
+/// Reads the chain of the run in `folder`, which may still be growing, and checks it as a whole.
 ///
 /// # Errors
-/// Those of [`journal::read`]; draws that the priors exclude; a chain that is shorter than it was.
+/// Those of [`journal::read`]; draws that the priors exclude; a chain that became shorter.
 pub fn read_chain(folder: &Path, manifest: &Manifest) -> Result<Chain, JournalError> {
     let path = folder.join(CHAIN);
     let (chain, is_whole) = journal::read_to_end(&path, &manifest.shape())?;
@@ -79,7 +79,7 @@ fn within_priors(path: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), 
     }
 }
 
-/// Where the walkers start.
+/// The start of the walkers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartFrom {
     /// From the quadratic posterior around the optimum, widened: all its peaks get walkers in proportion. Where there
@@ -90,26 +90,26 @@ pub enum StartFrom {
     Prior,
 }
 
-/// A chain of the posterior of a [`Scene`], with what it was begun with.
+/// A chain of the posterior of a [`Scene`], with its manifest.
 pub struct Run {
-    /// What it was begun with.
+    /// Its manifest.
     #[doc(hidden)]
     pub manifest: Manifest,
     /// The chain so far.
     pub chain: Chain,
-    /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
+    /// Reconstructions before its first step: for fitting and testing the surrogate, and for the start.
     #[doc(hidden)]
     pub preparation: usize,
-    /// How long the first step took: as long as others do.
+    /// Duration of the first step: the same as of others.
     first_step: Duration,
     target: Target,
     task: Task,
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
     settings: Settings,
-    /// With the share of its proposals accepted on trial.
+    /// With the fraction of its proposals accepted in a test.
     surrogate: Option<(Surrogate, f64)>,
-    /// Where every step is written before the next begins; none in memory.
+    /// Every step is written to it before the next begins; `None` in memory.
     journal: Option<Journal>,
 }
 
@@ -117,16 +117,16 @@ impl Run {
     /// Searches for the best parameters of `scene` and draws the start around them; the run is kept in memory.
     ///
     /// # Errors
-    /// [`RunError`]: nothing is free, the search leads nowhere, the sampler's settings are wrong.
+    /// [`RunError`]: no free parameter, a failed search, wrong settings of the sampler.
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         scene.settings.require_free()?;
         Run::in_memory(scene, scene.optimise()?, StartFrom::Optimum, &Pool::default())
     }
 
-    /// The same, kept in `folder`: `manifest.json` and `chain.jsonl`, a line for each walker and step.
+    /// The same, kept in `folder`: `manifest.json` and `chain.jsonl`, one line per walker and step.
     ///
     /// # Errors
-    /// As [`Run::new`], and a folder that holds a run already or cannot be written.
+    /// As [`Run::new`], and a folder that contains a run already or cannot be written.
     pub fn new_in(folder: &Path, scene: &Scene) -> Result<Self, RunError> {
         Run::new(scene)?.kept_in(folder, false)
     }
@@ -148,10 +148,10 @@ impl Run {
         Ok(Effort::add(folder, afresh, seconds, threads)?)
     }
 
-    /// What the chain says of each parameter, whether it has converged, and the verdict on a planet.
+    /// The summary of each parameter, the convergence, and the verdict on a planet.
     ///
     /// # Errors
-    /// A chain of another kind than its manifest: a fault of the program.
+    /// A chain that does not match its manifest: a bug.
     pub fn summary(&self) -> Result<RunSummary, RunError> {
         Ok(self.manifest.summarise(&self.settings, &self.chain)?.0)
     }
@@ -167,12 +167,12 @@ impl Run {
         Ok((chain, summary))
     }
 
-    /// Whether `folder` holds nothing but a run that ended before its first step: another one may replace it.
+    /// Whether `folder` contains only a run that ended before its first step: another one may replace it.
     pub fn is_false_start(folder: &Path) -> bool {
         is_false_start(folder, true)
     }
 
-    /// Begins a run at what a search `found`: draws the start and evaluates it.
+    /// Begins a run at the result `found` of a search: draws the start and evaluates it.
     ///
     /// # Errors
     /// [`RunError`], where there is no start.
@@ -196,7 +196,7 @@ impl Run {
         let began = Instant::now();
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
         let took = began.elapsed();
-        // what was not evaluated looks like a start that is none
+        // points without an evaluation would look like an invalid start
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
         let blind_search = BlindSearch::summary_of(scene, found.detection.as_deref());
         let manifest = new_manifest(scene, origin, &target, blind_search, start);
@@ -206,20 +206,20 @@ impl Run {
         Ok(Run { preparation, first_step: took, ..run })
     }
 
-    /// The same in `folder`, which is made: its steps so far are written with the manifest. A run that is there already
-    /// is replaced if `replace`, and refused otherwise.
+    /// The same in `folder`, which is created: its steps so far are written with the manifest. An existing run is
+    /// replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
-    /// A folder that holds a run already or cannot be written.
+    /// A folder that contains a run already or cannot be written.
     #[doc(hidden)]
     pub fn kept_in(self, folder: &Path, replace: bool) -> Result<Self, RunError> {
         self.kept_by(Run::claim(folder, replace)?, folder)
     }
 
-    /// Claims `folder`, which is made, for a run that is yet to be found: others are refused from now on.
+    /// Creates and claims `folder` for a run whose search has not ended yet: from now on others are refused.
     ///
     /// # Errors
-    /// A folder that holds a run already (unless `replace`), in which another process begins one, or that cannot be
+    /// A folder that contains a run already (unless `replace`), in which another process begins one, or that cannot be
     /// written.
     #[doc(hidden)]
     pub fn claim(folder: &Path, replace: bool) -> Result<Claim, RunError> {
@@ -232,7 +232,7 @@ impl Run {
     /// A folder that cannot be written.
     #[doc(hidden)]
     pub fn kept_by(self, claim: Claim, folder: &Path) -> Result<Self, RunError> {
-        // the chain first: whoever holds it may write the manifest
+        // the chain first: a lock on it is required for writing the manifest
         let mut journal = Journal::begin(claim, self.manifest.shape())?;
         match std::fs::remove_file(folder.join(SUMMARY)) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
@@ -246,7 +246,7 @@ impl Run {
         Ok(Run { journal: Some(journal), ..self })
     }
 
-    /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
+    /// Resumes the run in `folder`, `extend` steps beyond its last one if given.
     ///
     /// # Errors
     /// [`RunError`]: no run there, changed config or data, a broken chain.
@@ -317,7 +317,7 @@ impl Run {
         self.policy.steps
     }
 
-    /// What every parameter must reach.
+    /// Goals for every parameter.
     #[doc(hidden)]
     pub fn goals(&self) -> &Goals {
         &self.policy.goals
@@ -381,7 +381,7 @@ fn new_manifest(
     }
 }
 
-/// The walkers at step 0, evaluated; refused here, before anything is written, if they are no start.
+/// The walkers at step 0, evaluated; an invalid start is refused here, before anything is written.
 fn first_step(
     scene: &Scene,
     target: &Target,

@@ -1,4 +1,4 @@
-//! How far a growing chain has come, for those who wait for it.
+//! The progress of a growing chain, for its user.
 
 use super::Run;
 use crate::sampling::chain::advice::growth_needed;
@@ -6,29 +6,29 @@ use crate::sampling::chain::{Convergence, Goals, Record};
 use crate::sampling::log_density::Status;
 use std::time::{Duration, Instant};
 
-/// What a chain will cost, guessed before its second step.
+/// The cost of a chain, estimated before its second step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// Steps until every parameter should have reached its goals; where one cannot tell, the step limit.
+    /// Steps until every parameter should have reached its goals; the step limit if unknown.
     pub steps: usize,
     /// Whether that is the limit.
     pub is_limit: bool,
     /// Evaluations of a step.
     pub evaluations: usize,
-    /// How long they took in the first step.
+    /// Their duration in the first step.
     pub of_a_step: Duration,
 }
 
-/// A surrogate of which a smaller share is accepted does not tell how long a chain takes.
+/// With a smaller accepted fraction, a surrogate does not predict the length of a chain.
 const TELLING: f64 = 0.3;
 
-/// Steps that are left out at the beginning, and effective samples of an evaluation over the square of the share
-/// accepted, as chains of simulated stars had them.
+/// Discarded steps at the beginning, and effective samples per evaluation over the square of the accepted fraction,
+/// from chains of simulated stars.
 const LEFT_OUT: f64 = 10.0;
 const EFFICIENCY: f64 = 0.7;
 
 impl Cost {
-    /// Of a run that has made its first step.
+    /// For a run after its first step.
     pub fn of(run: &Run) -> Self {
         let evaluations = run.chain.shape().size();
         let accepted = run.surrogate.as_ref().map_or(0.0, |(_, accepted)| *accepted);
@@ -38,13 +38,13 @@ impl Cost {
         Cost { steps: if is_limit { limit } else { needed as usize }, is_limit, evaluations, of_a_step: run.first_step }
     }
 
-    /// How long all of it takes.
+    /// Total duration.
     pub fn time(&self) -> Duration {
         self.of_a_step.mul_f64(self.steps as f64)
     }
 }
 
-/// Watches a chain grow.
+/// Measures the progress of a chain.
 pub struct Meter {
     names: Vec<String>,
     goals: Goals,
@@ -54,35 +54,35 @@ pub struct Meter {
     evaluations: usize,
     accepted: usize,
     moved: usize,
-    /// R-hat and ESS of the parameters farthest from their goals, at the last look.
+    /// R-hat and ESS of the parameters farthest from their goals, at the last check.
     convergence: Option<String>,
-    /// The step at which the goals should be reached, if one can tell.
+    /// The step at which the goals should be reached, if it can be estimated.
     goal_step: Option<f64>,
 }
 
-/// How far a chain has come.
+/// The progress of a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pace {
     /// The last step made.
     pub step: usize,
     /// The step at which the run ends if its goals are not reached before.
     pub last_step: usize,
-    /// The step at which it should end: that of the goals where they are in sight, or else the last one.
+    /// The step at which it should end: that of the goals if it can be estimated, otherwise the last one.
     pub end: f64,
-    /// Whether the goals are in sight.
+    /// Whether the step of the goals can be estimated.
     pub in_sight: bool,
     /// Time left until then.
     pub left: Duration,
-    /// Evaluations a second.
+    /// Evaluations per second.
     pub rate: f64,
-    /// Accepted share of the proposals.
+    /// Accepted fraction of the proposals.
     pub acceptance: f64,
-    /// R-hat and effective sample size at the last look, in words.
+    /// R-hat and effective sample size at the last check, as text.
     pub convergence: Option<String>,
 }
 
 impl Meter {
-    /// Of a run that is about to go on.
+    /// For a run that is about to continue.
     pub fn new(run: &Run) -> Self {
         Meter {
             names: run.chain.names().to_vec(),
@@ -98,7 +98,7 @@ impl Meter {
         }
     }
 
-    /// Counts a step, and the `convergence` where it was looked at.
+    /// Counts a step, and the `convergence` where it was checked.
     pub fn step(&mut self, records: &[Record], convergence: Option<&Convergence>) -> Pace {
         self.evaluations += records.iter().filter(|r| r.proposed != Status::OutsidePrior).count();
         self.accepted += records.iter().filter(|r| r.accepted).count();

@@ -1,5 +1,5 @@
-//! Where the walkers of a run begin: at draws from the surrogate, around the maxima that the search found, or all over
-//! the prior.
+//! The start of the walkers of a run: at draws from the surrogate, around the maxima of the search, or all over the
+//! prior.
 
 use super::RunError;
 use super::error::PRIOR_TRIES;
@@ -12,14 +12,14 @@ use crate::sampling::optimise::Optimum;
 use crate::surface::surrogate::Surrogate;
 use rand_chacha::ChaCha8Rng;
 
-/// Starts are wider than the curvature by this factor, so that R-hat can tell whether the chain has forgotten them.
+/// Starts are wider than the curvature by this factor, so that R-hat reveals whether the chain has forgotten them.
 const OVERDISPERSION: f64 = 1.5;
 
 /// Draws from the surrogate tried for one walker.
 const DRAW_TRIES: usize = 3;
 
-/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these
-/// deserve; `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
+/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than their
+/// weight; `None` where the priors exclude most of it, or no reconstruction succeeds at a draw.
 pub(super) fn from_surrogate(
     surrogate: &Surrogate,
     target: &Target,
@@ -32,8 +32,8 @@ pub(super) fn from_surrogate(
 }
 
 /// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of
-/// them and half around all in turn, another one for each ensemble: that walkers can hop between them, and that R-hat
-/// tells if they do not.
+/// them and half around all in turn, another one for each ensemble: so walkers can move between them, and R-hat reveals
+/// if they do not.
 pub(super) fn around_maxima(
     found: &Found,
     target: &Target,

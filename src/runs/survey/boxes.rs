@@ -5,7 +5,7 @@ use crate::star::planet::amplitude_kms;
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-/// What the size of a planet is counted in.
+/// The unit of the size of a planet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
     /// Semi-amplitude (km/s).
@@ -14,14 +14,14 @@ pub enum Size {
     Mass,
 }
 
-/// Planets whose rate is asked for.
+/// Planets whose rate is requested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanetBox {
     /// Shortest and longest period (d).
     pub periods_d: [f64; 2],
     /// Smallest and largest size.
     pub sizes: [f64; 2],
-    /// What the size is.
+    /// The kind of the size.
     pub size: Size,
 }
 
@@ -33,7 +33,7 @@ impl PlanetBox {
     /// From text, `P1:P2,S1:S2`.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Its error.
     pub fn from_text(text: &str, size: Size) -> Result<Self, String> {
         let form = "four numbers above 0, rising in each pair: P1:P2,".to_owned()
             + match size {
@@ -55,7 +55,7 @@ impl PlanetBox {
         Span { periods_d: self.periods_d, sizes: self.sizes }
     }
 
-    /// Semi-amplitude (km/s) of a size at a period, around a star of that mass: of masses NaN where it is unknown.
+    /// Semi-amplitude (km/s) of a size at a period, around a star of that mass: NaN for masses where it is unknown.
     pub fn k_kms(&self, period_d: f64, size: f64, mass_msun: Option<f64>) -> f64 {
         match self.size {
             Size::Amplitude => size,
@@ -63,7 +63,7 @@ impl PlanetBox {
         }
     }
 
-    /// It in words.
+    /// As text.
     pub fn words(&self) -> String {
         let [[p1, p2], [s1, s2]] = [self.periods_d, self.sizes];
         match self.size {

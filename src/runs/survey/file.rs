@@ -1,5 +1,5 @@
-//! The files of a survey: `survey.csv`, a line for each star; `completeness.csv`, star by star and summed; and
-//! `survey.json`; and what is printed.
+//! The files of a survey: `survey.csv`, one line per star; `completeness.csv`, star by star and summed; and
+//! `survey.json`; and the printed output.
 
 use super::SurveySettings;
 use super::boxes::{PlanetBox, Size};
@@ -23,7 +23,7 @@ pub const COMPLETENESS: &str = "completeness.csv";
 /// See [`CSV`].
 pub const JSON: &str = "survey.json";
 
-/// Periods (d) at which limits are quoted, as columns of `survey.csv` name them.
+/// Periods (d) at which limits are quoted, with the names of their columns in `survey.csv`.
 const QUOTED: [(f64, &str); 3] = [(1.0, "k95_kms_1d"), (3.0, "k95_kms_3d"), (10.0, "k95_kms_10d")];
 
 /// Why completeness is lower than it could be.
@@ -46,9 +46,9 @@ pub struct SurveyFile {
     pub boxes: Vec<BoxRecord>,
     /// The stars.
     pub stars: Vec<StarRecord>,
-    /// Rates of each box, of all stars and of groups.
+    /// Rates of each box, for all stars and for groups.
     pub rates: Vec<RateRecord>,
-    /// What has to be known.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// Version of the program.
     pub version: String,
@@ -82,9 +82,9 @@ impl Saved for SurveyFile {
 pub struct BoxRecord {
     /// Shortest and longest period (d).
     pub period_d: [f64; 2],
-    /// Smallest and largest semi-amplitude (km/s); null of a box of masses.
+    /// Smallest and largest semi-amplitude (km/s); null for a box of masses.
     pub k_kms: Option<[f64; 2]>,
-    /// Smallest and largest minimum mass (Jupiter masses); null of a box of semi-amplitudes.
+    /// Smallest and largest minimum mass (Jupiter masses); null for a box of semi-amplitudes.
     pub msini_mjup: Option<[f64; 2]>,
 }
 
@@ -97,7 +97,7 @@ pub struct StarRecord {
     pub group: Option<String>,
     /// Whether it counts in rates.
     pub counted: bool,
-    /// What the search found.
+    /// The result of the search.
     pub finding: Finding,
     /// Its FAP.
     pub false_alarm_probability: Option<f64>,
@@ -105,7 +105,7 @@ pub struct StarRecord {
     pub period_d: Option<f64>,
     /// Its semi-amplitude (km/s).
     pub k_kms: Option<f64>,
-    /// The error of that (km/s).
+    /// Its uncertainty (km/s).
     pub sigma_k_kms: Option<f64>,
     /// Its minimum mass (Jupiter masses), where the star's mass is known.
     pub msini_mjup: Option<f64>,
@@ -115,7 +115,7 @@ pub struct StarRecord {
     pub k95_kms: Vec<Option<f64>>,
     /// Mean completeness over each box.
     pub completeness: Vec<f64>,
-    /// Chance of a false alarm in each box.
+    /// Probability of a false alarm in each box.
     pub false_alarms: Vec<f64>,
 }
 
@@ -158,7 +158,7 @@ impl StarRecord {
 }
 
 impl SurveyFile {
-    /// Of some stars.
+    /// For some stars.
     pub(super) fn new(stars: &[Star], settings: &SurveySettings) -> Self {
         let SurveySettings { boxes, prior, .. } = settings;
         let mut warnings = Vec::new();
@@ -220,7 +220,7 @@ impl SurveyFile {
         table
     }
 
-    /// What is printed.
+    /// The printed output.
     pub fn table(&self) -> String {
         let mut text = self.table_of_stars();
         let prior = match self.prior {
@@ -298,7 +298,7 @@ impl RateRecord {
     }
 }
 
-/// A finding as files have it.
+/// A finding in the notation of files.
 fn finding(finding: Finding) -> &'static str {
     match finding {
         Finding::NoPlanetNeeded => "no-planet-needed",

@@ -1,7 +1,7 @@
 //! Searches and detection limits in folders, matched star by star.
 //!
-//! Results of the same observations are of one star. Its name is `star.name` of the config, or else that of the folder
-//! (of the one around it, where it is named after a command). Two sets of observations under one name are refused.
+//! Results of the same observations belong to one star. Its name is `star.name` of the config, or else that of the
+//! folder (of the parent, where it is named after a command). Two sets of observations with one name are refused.
 
 use super::star::Star;
 use crate::data::config::first_difference;
@@ -17,7 +17,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Why a sample cannot be made of some folders.
+/// Why some folders do not form a sample.
 #[derive(Debug, thiserror::Error)]
 pub enum SurveyError {
     /// A result that cannot be read.
@@ -31,21 +31,21 @@ pub enum SurveyError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// Stars that are incomplete or not to be told apart, by name.
+    /// Stars that are incomplete or cannot be distinguished, by name.
     #[error("{0}")]
     Sample(String),
 }
 
-/// How deep inside a folder results are looked for.
+/// Depth of the search for results inside a folder.
 const DEPTH: usize = 4;
 
-/// Folders that are named after what is in them, not after a star.
+/// Folders that are named after their content, not after a star.
 const COMMANDS: [&str; 6] = ["periodogram", "search", "limits", "sample", "run", "chain"];
 
-/// What the survey needs of a search: `periodogram.json`.
+/// The part of a search that the survey needs: `periodogram.json`.
 #[derive(Deserialize)]
 struct SearchPart {
     verdict: Verdict,
@@ -54,7 +54,7 @@ struct SearchPart {
     config: Value,
 }
 
-/// The same of a chain: `manifest.json`, which keeps the search that the verdict rests on.
+/// The same of a chain: `manifest.json`, which contains the search behind its verdict.
 #[derive(Deserialize)]
 struct ChainPart {
     blind_search: Option<VerdictPart>,
@@ -86,7 +86,7 @@ struct Observed {
     limits: Vec<(PathBuf, LimitsFile)>,
 }
 
-/// The stars whose results are in `folders`, in the order in which they are met.
+/// The stars whose results are in `folders`, in the order of appearance.
 ///
 /// # Errors
 /// [`SurveyError`].
@@ -126,7 +126,7 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Adds the results in `folder`; those that are there already, by another path, are passed over.
+/// Adds the results in `folder`; those that were added already, by another path, are skipped.
 fn read(folder: &Path, found: &mut Vec<Observed>) -> Result<(), SurveyError> {
     let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let is_new = |known: &Path| known.canonicalize().unwrap_or_else(|_| known.to_owned()) != whole;
@@ -218,7 +218,7 @@ impl Observed {
     }
 }
 
-/// The name of a folder, of the one around it where it is named after a command.
+/// The name of a folder, or of its parent where it is named after a command.
 fn name_by_folder<'a>(mut folders: impl Iterator<Item = &'a Path>) -> String {
     let Some(folder) = folders.next() else { return String::new() };
     let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
@@ -244,7 +244,7 @@ fn check_names(found: &[Observed]) -> Result<(), SurveyError> {
     Ok(())
 }
 
-/// That every star has a search and limits; all that have not are named.
+/// Checks that every star has a search and limits; the error names all others.
 fn check_complete(found: &[Observed]) -> Result<(), SurveyError> {
     let of = |is: &dyn Fn(&Observed) -> bool| -> Vec<String> {
         found.iter().filter(|of| is(of)).map(Observed::name).collect()

@@ -1,8 +1,8 @@
 //! Many stars together: the completeness of a sample, and the rate of planets in it.
 //!
-//! In: folders of searches and of detection limits. `folders` matches them star by star, `star` is one star with
-//! both, `table` has what a table says of the stars. Out: [`file`]'s `survey.csv`, `completeness.csv`, `survey.json`.
-//! The statistics are in `planets::occurrence`.
+//! In: folders of searches and of detection limits. `folders` matches them star by star, `star` is one star with both,
+//! `table` reads a table of the stars. Out: [`file`]'s `survey.csv`, `completeness.csv`, `survey.json`. The statistics
+//! are in `planets::occurrence`.
 
 mod boxes;
 mod file;
@@ -21,14 +21,14 @@ use crate::data::io::atomic::WriteError;
 use crate::planets::occurrence::RatePrior;
 use std::path::{Path, PathBuf};
 
-/// What is asked of a sample.
+/// Settings of a survey.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurveySettings {
-    /// Boxes whose rate of planets is asked for; those of hot Jupiters where there are none.
+    /// Boxes whose rate of planets is requested; those of hot Jupiters where there are none.
     pub boxes: Vec<PlanetBox>,
     /// Prior of each rate.
     pub prior: RatePrior,
-    /// What else is known of the stars.
+    /// Further data on the stars.
     pub table: Option<StarTable>,
 }
 
@@ -46,10 +46,10 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Of the results in `folders`, and in folders inside these.
+    /// From the results in `folders`, and in folders inside these.
     ///
     /// # Errors
-    /// [`SurveyError`]: a star without search or limits, results that do not belong together, files that are wrong.
+    /// [`SurveyError`]: a star without search or limits, inconsistent results, files that are wrong.
     pub fn of(folders: &[PathBuf], settings: &SurveySettings) -> Result<Self, SurveyError> {
         let mut stars = folders::stars(folders)?;
         if let Some(table) = &settings.table {
@@ -75,7 +75,7 @@ impl Survey {
         self.file.write(&self.stars, folder)
     }
 
-    /// What is printed.
+    /// The printed output.
     pub fn table(&self) -> String {
         self.file.table()
     }

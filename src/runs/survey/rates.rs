@@ -1,4 +1,4 @@
-//! The rates of a sample: of each box, among all stars and among those of each group.
+//! The rates of a sample: for each box, among all stars and among those of each group.
 
 use super::boxes::PlanetBox;
 use super::star::Star;
@@ -11,15 +11,15 @@ pub struct RateRecord {
     /// Number of the box, from 1.
     #[serde(rename = "box")]
     pub planets: usize,
-    /// The group; null of all stars.
+    /// The group; null for all stars.
     pub group: Option<String>,
     /// Number of stars.
     pub stars: usize,
     /// Sum of their completeness.
     pub effective_stars: f64,
-    /// Signals in the box, each with its share.
+    /// Signals in the box, each with its probability of being there.
     pub detections: f64,
-    /// False alarms expected there, if no star has a planet.
+    /// Expected false detections there, if no star has a planet.
     pub false_alarms: f64,
     /// Those signals.
     pub signals: Vec<SignalRecord>,
@@ -44,7 +44,7 @@ pub struct RateRecord {
 /// A signal in a box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SignalRecord {
-    /// Of which star.
+    /// Name of the star.
     pub name: String,
     /// Probability that its orbit is in the box.
     pub share: f64,
@@ -52,7 +52,7 @@ pub struct SignalRecord {
     pub reliability: f64,
 }
 
-/// Of all stars first, then of the groups in the order in which they are met, box after box.
+/// For all stars first, then for the groups in the order of appearance, box after box.
 pub fn rates(stars: &[Star], boxes: &[PlanetBox], prior: RatePrior) -> Vec<RateRecord> {
     let mut groups: Vec<Option<&str>> = vec![None];
     for group in stars.iter().filter_map(|star| star.group.as_deref()) {
@@ -100,7 +100,7 @@ fn rate((number, group): (usize, Option<&str>), stars: &[(&Star, Member)], prior
     }
 }
 
-/// Their sum; 0 of none, where that of the standard library is -0.
+/// Their sum; 0 for none, where that of the standard library is -0.
 fn total(numbers: impl Iterator<Item = f64>) -> f64 {
     numbers.fold(0.0, |sum, x| sum + x)
 }

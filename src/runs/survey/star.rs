@@ -1,4 +1,4 @@
-//! One star of a sample: its verdict, and how complete its search is.
+//! One star of a sample: its verdict, and the completeness of its search.
 
 use super::boxes::PlanetBox;
 use crate::numerics::normal;
@@ -14,7 +14,7 @@ pub struct Star {
     pub name: String,
     /// Mass (solar masses), where the config has it.
     pub mass_msun: Option<f64>,
-    /// What the search found.
+    /// The verdict of the search.
     pub verdict: Verdict,
     /// Its limits.
     pub limits: LimitsFile,
@@ -24,7 +24,7 @@ pub struct Star {
     pub group: Option<String>,
     /// Probability that its signal is a planet's, if not chance.
     pub planet: f64,
-    /// What has to be known of its results.
+    /// Warnings on its results.
     pub warnings: Vec<String>,
 }
 
@@ -33,7 +33,7 @@ const NOT_JUDGED: &str = "no verdict, the star is not counted";
 const KNOWN: &str = "a planet of known ephemeris: the star is not counted";
 
 impl Star {
-    /// Why it says nothing of rates; `None` where it does.
+    /// Why it does not constrain rates; `None` where it does.
     pub fn left_out(&self) -> Option<&'static str> {
         match (self.verdict.finding, &self.verdict.known) {
             (Finding::NotJudged, _) => Some(NOT_JUDGED),
@@ -64,7 +64,7 @@ impl Star {
         self.mass_msun.map(|mass| minimum_mass(k_kms, period_d, mass).mjup)
     }
 
-    /// What it says of a box.
+    /// Its contribution to a box.
     pub fn member(&self, planets: &PlanetBox) -> Member {
         let (span, k_kms) = (planets.span(), |period: f64, size: f64| planets.k_kms(period, size, self.mass_msun));
         let just_detected = |period: f64| self.limit_kms(period, |limit| limit.k50_kms);
@@ -79,8 +79,8 @@ impl Star {
         Member { signal, ..member }
     }
 
-    /// Probability that the orbit of its signal is in a box: by the shares of an ambiguous period, and by the error of
-    /// the size.
+    /// Probability that the orbit of its signal is in a box: by the probabilities of an ambiguous period, and by the
+    /// uncertainty of the size.
     fn share_within(&self, planets: &PlanetBox) -> f64 {
         let Some(signal) = self.verdict.signal.filter(|_| self.verdict.finding.is_signal()) else { return 0.0 };
         let within = |period: f64| {

@@ -1,4 +1,4 @@
-//! What a table says of the stars: their groups, and how reliable their signals are.
+//! A table of the stars: their groups, and the reliability of their signals.
 
 use super::folders::SurveyError;
 use super::star::Star;
@@ -11,17 +11,17 @@ use std::path::PathBuf;
 pub struct StarTable {
     /// The file (CSV).
     pub path: PathBuf,
-    /// Column of the groups whose rates are asked for.
+    /// Column of the groups whose rates are requested.
     pub group: Option<String>,
     /// Column of the probability that the star's signal is a planet.
     pub reliability: Option<String>,
 }
 
 impl StarTable {
-    /// Reads what it says of `stars`.
+    /// Reads the data on `stars`.
     ///
     /// # Errors
-    /// A table that cannot be read, without a column or a star, or with a probability that is none.
+    /// A table that cannot be read, without a column or a star, or with an invalid probability.
     pub(super) fn read_into(&self, stars: &mut [Star]) -> Result<(), SurveyError> {
         let table = Words::read(&self.path)?;
         let key = ["name", "star"].into_iter().find(|name| table.has(name)).unwrap_or(table.first());

@@ -1,4 +1,4 @@
-//! Profiles that all others do not predict, with larger errors of their own.
+//! Profiles that all others do not predict, with their own factors on the uncertainties.
 
 use crate::model::ParameterValues;
 use crate::surface::Known;
@@ -9,24 +9,24 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::surface::evolving_map::events::{ByHand, Event};
 
-/// More than this share of the profiles are not events: the model is wrong, or the errors are.
+/// More than this fraction of the profiles are not events: the model or the uncertainties are wrong.
 const MOST: f64 = 1.0 / 3.0;
 
-/// Events that are named one by one at most.
+/// Largest number of events that are listed one by one.
 const NAMED: usize = 5;
 
 /// The events among some profiles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Events {
-    /// Those whose errors are larger; all profiles keep theirs where there are too many.
+    /// Those with larger uncertainties; none are rescaled where there are too many.
     pub profiles: Vec<Event>,
-    /// Number of profiles that the others do not predict, and of all, where that is more than a third of them.
+    /// Number of profiles that the others do not predict, and of all profiles, where that is more than a third of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub too_many: Option<[usize; 2]>,
 }
 
 impl Events {
-    /// Of the profiles of `imager`, the star at `values` with a field like `near`, without a planet.
+    /// The events among the profiles of `imager`, the star at `values` with a field like `near`, without a planet.
     ///
     /// # Errors
     /// [`NoFit`].
@@ -41,7 +41,7 @@ impl Events {
         Ok(Events::among(found, by_hand))
     }
 
-    /// Those `found` among profiles of which so much is known `by_hand`.
+    /// The events `found` among profiles, given what the user states of each `by_hand`.
     fn among(found: Vec<Event>, by_hand: &[ByHand]) -> Self {
         let all = by_hand.len();
         let unforeseen = found.iter().filter(|event| by_hand[event.profile - 1] != ByHand::Event).count();
@@ -51,14 +51,14 @@ impl Events {
         }
     }
 
-    /// Factors on the errors of so many profiles.
+    /// Factors on the uncertainties of so many profiles.
     pub fn factors(&self, profiles: usize) -> Vec<f64> {
         let mut factors = vec![1.0; profiles];
         self.profiles.iter().for_each(|event| factors[event.profile - 1] = event.sigma_factor);
         factors
     }
 
-    /// That there are too many, with a name for it.
+    /// The message that there are too many, with its status.
     pub fn too_many(&self) -> Option<String> {
         self.too_many.map(|[events, all]| {
             format!(
@@ -68,7 +68,7 @@ impl Events {
         })
     }
 
-    /// It in words, the largest of many; `None` where there is none.
+    /// One line of text, with the largest of many events; `None` where there is none.
     pub fn line(&self) -> Option<String> {
         let of = |event: &&Event| {
             let Event { profile, time_d, sigma_factor, .. } = event;
@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(many.factors(12), vec![1.0; 12]);
         assert!(many.too_many().unwrap().starts_with("5 of 12 profiles are outliers (too-many-events)"));
         assert_eq!(many.line(), many.too_many());
-        // those that a user names do not count
+        // events named by the user do not count
         by_hand[0] = ByHand::Event;
         assert_eq!(Events::among((1..=5).map(event).collect(), &by_hand).profiles.len(), 5);
         let one = Events::among(vec![event(3)], &by_hand).line().unwrap();

@@ -1,4 +1,4 @@
-//! What activity indicators have to do with the spots that the profiles show (`docs/method.md` section 9).
+//! How activity indicators depend on the spots in the profiles (`docs/method.md` section 9).
 
 use crate::model::ParameterValues;
 use crate::surface::Known;
@@ -8,8 +8,9 @@ use crate::surface::imaging::Imager;
 use crate::surface::indicator::scaled;
 use crate::surface::photometry::Flux;
 
-/// Gains and jitters of indicators of these names and values, in the order of time, by a field that is fitted to the
-/// profiles alone, of the star at `values` without a planet: a jitter takes up its orbit, which spots would imitate.
+/// Gains and jitters of indicators with these names and values, in the order of time, by a field that is fitted to the
+/// profiles alone, with the star at `values` without a planet: a jitter absorbs its orbit, which spots would otherwise
+/// mimic.
 ///
 /// # Errors
 /// [`NoFit`].

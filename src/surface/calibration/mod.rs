@@ -1,6 +1,6 @@
-//! What the profiles say of themselves before anything else: line, continuum and vsini ([`first_look`]), how large
-//! their uncertainties are ([`noise`]), the RV jitter ([`jitter`]), RV offsets between data sets ([`offsets`]), the
-//! target chi2 ([`target`]), and what activity indicators have to do with the spots ([`indicators`]).
+//! Quantities measured from the profiles before anything else: line, continuum and vsini ([`first_look`]), the size of
+//! their uncertainties ([`noise`]), the RV jitter ([`jitter`]), RV offsets between data sets ([`offsets`]), the target
+//! chi2 ([`target`]), and the dependence of activity indicators on the spots ([`indicators`]).
 
 pub mod events;
 pub mod first_look;
@@ -21,47 +21,47 @@ use crate::surface::{FieldStart, Known, OtherRotation};
 use events::{ByHand, Events};
 use star::{MeasuredStar, Open, with_geometry};
 
-/// What is to be asked of the profiles before maps and searches.
+/// The quantities to be fitted before maps and searches.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<'a> {
-    /// Numbers of the star.
+    /// Stellar parameters.
     pub fitted: &'a [Parameter],
     /// Events, with what is known of each profile.
     pub events: Option<&'a [ByHand]>,
-    /// Whether the velocities have a slope; one that the imager integrates out anyway is held where it is found.
+    /// Whether the velocities have a slope; one that the imager marginalises over is held at its best value.
     pub slope: bool,
-    /// Data sets with a contrast of spots for each.
+    /// Data sets that have their own spot contrast.
     pub contrasts: &'a [usize],
-    /// Parameters that are free.
+    /// Free parameters.
     pub free: &'a [FreeParameter],
-    /// Those that are integrated out.
+    /// Those that are marginalised over.
     pub nuisances: &'a [Nuisance],
-    /// Whether the rotation period can be another one.
+    /// Whether the rotation period may differ.
     pub rotation: bool,
 }
 
-/// What they say.
+/// The results.
 #[derive(Clone, Debug)]
 pub struct FoundStar {
     /// Line and active regions, where they are fitted.
     pub star: Option<MeasuredStar>,
-    /// Events, where they are looked for.
+    /// Events, where they are searched for.
     pub events: Option<Events>,
     /// Slopes at which drifts of the velocities are held (km/s per day); empty where they have none.
     pub drift_kms_d: Vec<f64>,
-    /// Contrasts of spots of the data sets that have one each.
+    /// Spot contrasts of the data sets that have their own.
     pub contrasts: Vec<FittedContrast>,
     /// Another rotation period with which the profiles are far more probable.
     pub other_rotation: Option<OtherRotation>,
-    /// Where a fit with finer maps begins.
+    /// The start of a fit with finer maps.
     pub field: FieldStart,
     /// Why there is no star, where one was to be fitted.
     pub problem: Option<NoFit>,
 }
 
-/// What the profiles say of all that is `asked`. Flares would be taken for regions, and regions for flares: events are
-/// found with plain spots first, and anew with the star that is found without them. Spots and jitter would take up a
-/// drift: profiles are expected where it moves them before either is fitted. `report` is told what is under way.
+/// Fits all that is `asked` from the profiles. Flares would be absorbed by regions, and regions by flares: events are
+/// found with plain spots first, and again with the star that is found without them. Spots and jitter would absorb a
+/// drift: the profiles are corrected for it before either is fitted. `report` is called with the current stage.
 ///
 /// # Errors
 /// [`NoFit`].
@@ -105,13 +105,13 @@ pub fn found(
     }
     report("fitting active regions");
     let open = Open { fitted: asked.fitted, free: asked.free };
-    // where that leads nowhere, the fit begins as the config has it
+    // if that fails, the fit begins with the values of the config
     if let Ok(Some(better)) = with_geometry(&without, &plain, known, open) {
         plain = better;
     }
     let (star, mut near) = match MeasuredStar::of(&without, &plain, known, open) {
         Ok(found) => found,
-        // the rest holds without it
+        // everything else is valid without it
         Err(error) => {
             let near = plain.marginal.assumed;
             let other_rotation = rotation(&imager, values, near, first.as_ref());
@@ -123,7 +123,7 @@ pub fn found(
     let mut values = values;
     star.set(&mut values, |parameter| !parameter.is_surface());
     if !contrasts.is_empty() && !star.numbers.is_empty() {
-        // the line of regions has taken up some of what spots were dark for
+        // the line of regions has absorbed part of the darkness of spots
         star.put_into(&mut without);
         let Fitted { marginal, .. } = coarsely(&without, values, Known { start: Some(near.into()), ..*known })?;
         near = marginal.assumed;
@@ -150,7 +150,7 @@ fn with_drifts_held(
         drifting = drifting.with_drifts(false);
     }
     let mut held = Vec::new();
-    // a steep one has bent the maps from which it was found
+    // a steep drift has distorted the maps from which it was found
     for _ in 0..2 {
         let Some(kms_d) = slopes(&drifting, &plain, asked.nuisances)? else { break };
         drifting.hold_drifts(&kms_d);
@@ -161,7 +161,7 @@ fn with_drifts_held(
     Ok((imager, plain, held))
 }
 
-/// The contrasts of spots in data `sets` with priors around those that were `given`, which are put into `imager`.
+/// The spot contrasts in data `sets` with priors around those `given`; the results are set in `imager`.
 fn fit_contrasts(
     imager: &mut Imager,
     near: &Fitted,

@@ -1,16 +1,16 @@
-//! How large the errors of observed profiles are, from the profiles themselves: by how much the continuum beside the
-//! line scatters, and by how much a map leaves the line unfitted.
+//! The uncertainties of observed profiles, from the profiles themselves: from the scatter of the continuum beside the
+//! line, and from the residuals of a map in the line.
 //!
-//! The continuum alone may promise too much, for in the core of the line LSD profiles are noisier and the model of the
-//! star is not perfect; what a map leaves over alone may be spots that it lacks. So the larger of the two counts, and
-//! both are written down. Of a map it is the smallest factor on the quoted errors with which it comes down to 0.97 per
-//! datum, as one of right errors does, before noise is turned into spots. Level and slope of the continuum do not
+//! The continuum alone may underestimate them, because LSD profiles are noisier in the core of the line and the model
+//! of the star is not perfect; residuals of a map alone may be spots that it lacks. So the larger of the two counts,
+//! and both are recorded. For a map it is the smallest factor on the quoted uncertainties with which chi2 falls to 0.97
+//! per datum, as with correct uncertainties, before noise is turned into spots. Level and slope of the continuum do not
 //! count.
 //!
-//! Noise correlated over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of
-//! n, and a target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become
-//! what they are. What counts is noise that looks like the local line, for nothing in a profile is narrower; where
-//! features are broader and the noise is correlated farther, errors are still a little too small.
+//! Noise that is correlated over n bins, as in LSD profiles, counts as one datum: uncertainties are larger by the root
+//! of n, and a target chi2 is meant per independent datum. So the map stays the same, and the uncertainties of orbits
+//! become correct. The correlation that counts is that on the scale of the local line, the narrowest feature of a
+//! profile; where features are broader and the noise is correlated farther, uncertainties are still a little too small.
 
 use crate::model::{Parameter, ParameterValues};
 use crate::star::StarSettings;
@@ -35,57 +35,57 @@ pub enum Weights {
 }
 
 impl Weights {
-    /// Whether it is the default, which configs need not mention.
+    /// Whether it is the default, which configs may omit.
     pub fn is_default(&self) -> bool {
         *self == Weights::default()
     }
 }
 
-/// What observations are to say of their errors.
+/// Settings of the uncertainties of observations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ErrorSettings {
-    /// Whether the factor on the errors is measured.
+    /// Whether the factor on the uncertainties is measured.
     pub measured: bool,
     /// How profiles are weighted.
     pub weights: Weights,
 }
 
-/// What they said.
+/// The measured uncertainties.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredErrors {
-    /// Factor on the quoted errors, where it was measured: the larger of the two below times the root of the
+    /// Factor on the quoted uncertainties, where it was measured: the larger of the two below times the root of the
     /// number of bins over which noise is correlated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<f64>,
-    /// Scatter of the continuum over quoted errors; null where there is too little of it.
+    /// Scatter of the continuum over quoted uncertainties; null where there is too little of it.
     pub continuum: Option<f64>,
-    /// What a map at the config's values leaves over, over quoted errors, where that was measured.
+    /// Residuals of a map at the config's values over quoted uncertainties, where that was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
-    /// Over how many bins the noise of the continuum is correlated, 1 for white noise.
+    /// Number of bins over which the noise of the continuum is correlated, 1 for white noise.
     pub correlated_bins: f64,
-    /// Factor on the errors of each profile beside that; empty where they are weighted as quoted.
+    /// Additional factor on the uncertainties of each profile; empty where they are weighted as quoted.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub profiles: Vec<f64>,
 }
 
-/// Why the profiles do not say.
+/// Why the profiles do not constrain them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoiseError {
-    /// No continuum to weight a profile by.
+    /// No continuum for weighting a profile.
     #[error("profile {profile} of the list has too little continuum beside the line, {freedom} bins of {least}")]
     NoContinuum {
         /// The profile, from 1.
         profile: usize,
-        /// Degrees of freedom that there are.
+        /// Available degrees of freedom.
         freedom: usize,
-        /// As many as it takes.
+        /// Required degrees of freedom.
         least: usize,
     },
     /// No map at the config's values.
     #[error("{0}")]
     Reference(#[from] ReferenceError),
-    /// No factor is enough.
+    /// No factor suffices.
     #[error(
         "no factor on the errors makes a map fit ({0:.3e} is not enough): the model of the star is not \
          that of the profiles"
@@ -94,7 +94,7 @@ pub enum NoiseError {
 }
 
 impl NoiseError {
-    /// The key of the config that asks for it.
+    /// The key of the config that requires it.
     pub fn key(&self) -> &'static str {
         match self {
             NoiseError::NoContinuum { .. } => "observations.weights",
@@ -103,30 +103,31 @@ impl NoiseError {
     }
 }
 
-/// What is missing where errors are not measured, and how to give it.
+/// What is missing where uncertainties are not measured, and how to give it.
 pub const NO_CONTINUUM: &str = "too little continuum beside the line to measure them by. Give profiles that reach \
      farther, or observations.sigma_scale as a number";
 
-/// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: errors are good to 13 and
-/// 22 %.
+/// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: the uncertainties are
+/// accurate to 13 and 22 %.
 const FEWEST: (usize, usize) = (30, 10);
 
-/// chi2 per datum of a map of profiles whose errors are right, at the lambda beyond which noise is turned into spots.
+/// chi2 per datum of a map of profiles with correct uncertainties, at the lambda beyond which noise is turned into
+/// spots.
 pub const FITTED: f64 = 0.97;
 
-/// The residuals stay when they move by less than this part.
+/// The residuals have converged when they change by less than this fraction.
 const STAYS: f64 = 0.005;
 
-/// Most maps; it takes three or four.
+/// Most maps; three or four are usual.
 const MOST_MAPS: usize = 12;
 
-/// Errors with which no map is found are tried again larger by this.
+/// Uncertainties with which no map is found are increased by this factor for another attempt.
 const FAR_TOO_SMALL: f64 = 3.0;
 
-/// Errors of a map larger than those of the continuum by more than this have a reason.
+/// Uncertainties by a map that exceed those by the continuum by more than this indicate a misfit.
 const MISFIT: f64 = 1.3;
 
-/// The same where there is no continuum to hold them against, but only errors as quoted.
+/// The same where there is no continuum for comparison, but only quoted uncertainties.
 const MISFIT_OF_QUOTED: f64 = 2.0;
 
 /// Uncertainties that are too small by more than this, and are the square of the scatter to these factors, look like
@@ -137,8 +138,8 @@ const VARIANCES: std::ops::RangeInclusive<f64> = 0.5..=2.5;
 /// Beyond this many local line widths from the limb there is continuum.
 const BEYOND: f64 = 3.0;
 
-/// The errors of `observations`, cut as they are used, by their continuum: that of `whole`, the same profiles in their
-/// whole width, beside the line of `star` at `values`. The factor is that of the continuum for now.
+/// The uncertainties of `observations`, with their cuts, by their continuum: that of `whole`, the same profiles over
+/// their full width, beside the line of `star` at `values`. The factor is that of the continuum for now.
 ///
 /// # Errors
 /// [`NoiseError::NoContinuum`].
@@ -164,9 +165,9 @@ pub fn by_continuum(
     Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }
 
-/// The scatter of each profile over that of them all, as far as the continuum knows it: the logarithms of equal
-/// profiles scatter by `1 / (2 freedom)` in variance, and are drawn together by the share that this has in the scatter
-/// there is. Mean weights stay.
+/// The scatter of each profile relative to that of all, as far as the continuum constrains it: the logarithms of equal
+/// profiles scatter by `1 / (2 freedom)` in variance, and are shrunk together by the fraction of the total scatter that
+/// this explains. Mean weights are unchanged.
 fn relative(scatter: &[Scatter]) -> Result<Vec<f64>, NoiseError> {
     let ratio = |(k, s): (usize, &Scatter)| {
         let missing = NoiseError::NoContinuum { profile: k + 1, freedom: s.freedom, least: FEWEST.1 };
@@ -185,11 +186,11 @@ fn relative(scatter: &[Scatter]) -> Result<Vec<f64>, NoiseError> {
 }
 
 impl MeasuredErrors {
-    /// Takes the residuals of a map into account. `imager` is of the profiles with errors scaled by what was measured
-    /// so far, times a factor.
+    /// Takes the residuals of a map into account. `imager` returns the profiles with uncertainties scaled by the
+    /// results so far, times a factor.
     ///
     /// # Errors
-    /// The outer ones are those of `imager`, the inner ones say that there is no map.
+    /// The outer error is that of `imager`, the inner one is that there is no map.
     pub fn count_residuals<E>(
         &mut self,
         values: ParameterValues,
@@ -208,12 +209,12 @@ impl MeasuredErrors {
         Ok(Ok(()))
     }
 
-    /// By how much the residuals of a map are larger than the scatter of the continuum, where both were measured.
+    /// The ratio of the residuals of a map to the scatter of the continuum, where both were measured.
     pub fn misfit(&self) -> Option<f64> {
         Some(self.residual? / self.continuum?)
     }
 
-    /// Whether errors are so large because the model does not fit.
+    /// Whether uncertainties are so large because the model does not fit.
     pub fn is_misfit(&self) -> bool {
         match self.misfit() {
             Some(misfit) => misfit > MISFIT,
@@ -221,7 +222,7 @@ impl MeasuredErrors {
         }
     }
 
-    /// That in a sentence, where it is so.
+    /// A sentence on that, where it is true.
     pub fn misfit_text(&self) -> Option<String> {
         let text = match self.misfit() {
             Some(misfit) => format!("Residual rms is {misfit:.1} times the continuum rms"),
@@ -230,7 +231,7 @@ impl MeasuredErrors {
         self.is_misfit().then(|| format!("{text}: check vsini, line profile and continuum"))
     }
 
-    /// Multiplies the errors of `observations` by all that was measured.
+    /// Multiplies the uncertainties of `observations` by all measured factors.
     pub fn apply(&self, observations: &mut Observations) {
         for (k, profile) in observations.profiles.iter_mut().enumerate() {
             let factor = self.sigma_scale.unwrap_or(1.0) * self.profiles.get(k).copied().unwrap_or(1.0);
@@ -238,7 +239,7 @@ impl MeasuredErrors {
         }
     }
 
-    /// It in a line.
+    /// One line of text.
     pub fn line(&self) -> String {
         let mut line = match (self.continuum, self.residual) {
             (Some(continuum), _) => format!("continuum rms {continuum}"),
@@ -261,8 +262,8 @@ impl MeasuredErrors {
     }
 }
 
-/// That uncertainties whose median is `quoted` (in units of the continuum), and which are too small by a `factor`, look
-/// like variances, if they do.
+/// The remark that uncertainties whose median is `quoted` (in units of the continuum), and which are too small by a
+/// `factor`, look like variances, if they do.
 pub fn variances(quoted: f64, factor: f64) -> Option<String> {
     let actual = factor * quoted;
     let is_square = VARIANCES.contains(&(actual / quoted.sqrt()));
@@ -274,8 +275,8 @@ pub fn variances(quoted: f64, factor: f64) -> Option<String> {
     })
 }
 
-/// The median uncertainty as quoted, and by how much more than that bins scatter about a cubic through four neighbours:
-/// an upper limit to their noise, as lines that are narrow for the bins scatter likewise. `None` of short profiles.
+/// The median quoted uncertainty, and the ratio to it of the scatter of bins about a cubic through four neighbours: an
+/// upper limit to their noise, because lines that are narrow for the bins scatter likewise. `None` for short profiles.
 pub fn by_neighbours(observations: &Observations) -> Option<(f64, f64)> {
     const CUBIC: [(usize, f64); 5] = [(0, 1.0), (1, -4.0), (2, 6.0), (3, -4.0), (4, 1.0)];
     const NORM: f64 = 8.37;
@@ -294,11 +295,11 @@ pub fn by_neighbours(observations: &Observations) -> Option<(f64, f64)> {
     Some((quoted, scatter / quoted))
 }
 
-/// The smallest factor on the errors with which a map comes down to 0.97 per independent datum before noise is turned
-/// into spots. `imager` is of the profiles with errors times a factor.
+/// The smallest factor on the uncertainties with which a map reaches 0.97 per independent datum before noise is turned
+/// into spots. `imager` returns the profiles with uncertainties times a factor.
 ///
 /// # Errors
-/// The outer ones are those of `imager`, the inner ones say that there is no map.
+/// The outer error is that of `imager`, the inner one is that there is no map.
 pub fn factor_to_fit<E>(
     values: ParameterValues,
     correlated_bins: f64,
@@ -308,7 +309,7 @@ pub fn factor_to_fit<E>(
     for _ in 0..MOST_MAPS {
         let chi2 = match chi2_at(&imager(factor)?, values, correlated_bins) {
             Ok(chi2) => chi2,
-            // errors that are far too small for the model take more steps than a map may
+            // uncertainties that are far too small for the model take more steps than a map may
             Err(error) if error.ran_out_of_steps() => {
                 factor *= FAR_TOO_SMALL;
                 continue;
@@ -334,7 +335,7 @@ pub fn chi2_at(imager: &Imager, values: ParameterValues, correlated_bins: f64) -
     Ok(map.solution.chi2 * correlated_bins / imager.data.depth.len() as f64)
 }
 
-/// To three digits: the last bits of a fit mean nothing, and everything after it hangs on them.
+/// Three digits: the last bits of a fit are not significant, and all later results depend on them.
 fn rounded(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }

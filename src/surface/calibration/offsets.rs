@@ -1,6 +1,5 @@
-//! Velocity zero points of data sets that are not known: one number a set, integrated out of velocities within a
-//! Gaussian prior; in maps they are held where they are most probable, so that no spot stands in for them
-//! (`docs/method.md` section 9).
+//! Unknown RV offsets of data sets: one offset per set, marginalised over in velocities within a Gaussian prior; in
+//! maps they are held at their most probable values, so that no spot mimics them (`docs/method.md` section 9).
 
 use crate::field::{FieldError, Lifetime};
 use crate::model::{Parameter, ParameterValues};
@@ -18,28 +17,27 @@ use std::sync::Arc;
 /// Standard deviation of the prior (km/s), around 0.
 pub const PRIOR_KMS: f64 = 3.0;
 
-/// Times that maps, orbit and zero points are found in turn.
+/// Iterations over maps, orbit and RV offsets.
 const ROUNDS: usize = 3;
 
-/// Zero points that move by less than this part of their errors stay.
+/// RV offsets that move by less than this fraction of their uncertainties have converged.
 const STAYS: f64 = 0.1;
 
-/// The zero point of a data set.
+/// The RV offset of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldZeroPoint {
-    /// Where it is held in maps (km/s).
+    /// The value at which it is held in maps (km/s).
     #[serde(default)]
     pub held_kms: f64,
-    /// What is found of it beside the orbit that is reported, all that is free integrated out; absent where no model
-    /// was fitted.
+    /// Its value with the reported orbit, marginalised over all free parameters; absent where no model was fitted.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub found: Option<ConstantVelocity>,
 }
 
-/// Finds the zero points of those sets of `imager` that have a prior, and holds them there: by the velocity quadratic
-/// of a usual field, with the best orbit at any of the `frequencies` in the model from the second round on; beside the
-/// systemic velocity, if that is among the `nuisances`. It is where to hold them, and no measurement of them: what they
-/// are off by is taken for jitter.
+/// Finds the RV offsets of those sets of `imager` that have a prior, and holds them there: by the velocity quadratic of
+/// a usual field, with the best orbit at any of the `frequencies` in the model from the second round on; together with
+/// the systemic velocity, if that is among the `nuisances`. The results serve to hold the offsets and are not
+/// measurements: their errors are absorbed by the jitter.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -83,7 +81,7 @@ pub fn hold(
     Ok(imager.zero_points.iter().map(|z| HeldZeroPoint { held_kms: z.held_kms(), found: None }).collect())
 }
 
-/// The best of the orbits of these frequencies, its period held.
+/// The best of the orbits at these frequencies, its period held.
 fn best_orbit(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> Option<Peak> {
     let trials = orbits::scan(quadratic, &frequencies.per_cycle);
     let found = trials.iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));

@@ -1,5 +1,5 @@
-//! The star itself, as far as a config leaves it to the profiles: active regions, whose line and limb contrast are
-//! those for which ln Z is largest, under priors (`docs/method.md` section 9).
+//! Stellar parameters that a config leaves to the profiles: active regions, with the line and limb contrast for which
+//! ln Z is largest, under priors (`docs/method.md` section 9).
 //!
 //! Priors are centred on the Sun: the line of a spot is 24 % wider than that of the quiet photosphere and has 7 % more
 //! equivalent width, and inhibited convection shifts it by 0.3 km/s (Dumusque, Boisse & Santos 2014, ApJ 796, 132,
@@ -14,7 +14,7 @@ use crate::surface::evolving_map::{Assumed, Fitted, NoFit};
 use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 
-/// Means and standard deviations of the priors of active regions, and where a climb begins.
+/// Means and standard deviations of the priors of active regions, and the start of a climb.
 const PRIORS: [(Parameter, f64, f64, f64); Parameter::REGIONS.len()] = [
     (Parameter::RegionLineWidth, 1.24, 0.25, 1.24),
     (Parameter::RegionEquivalentWidth, 1.07, 0.2, 1.07),
@@ -24,13 +24,13 @@ const PRIORS: [(Parameter, f64, f64, f64); Parameter::REGIONS.len()] = [
     (Parameter::RegionDimmingLimb, 0.0, 0.7, 0.0),
 ];
 
-/// Widths of the priors of line and vsini around what the config says: shares of it, km/s.
+/// Widths of the priors of line and vsini around the values of the config: as fractions, km/s.
 const OF_LINE: f64 = 0.4;
 const OF_STRENGTH: f64 = 0.15;
 const OF_VSINI: (f64, f64) = (0.04, 1.0);
 const OF_LIMB_DARKENING: f64 = 0.15;
 
-/// The prior of a number of the star that is `value` by the config.
+/// The prior of a stellar parameter that is `value` in the config.
 fn prior(parameter: Parameter, value: f64) -> StarPrior {
     let (low, high) = parameter.widest();
     let of =
@@ -52,18 +52,18 @@ fn prior(parameter: Parameter, value: f64) -> StarPrior {
     }
 }
 
-/// What is asked of the star: numbers that are fitted, and parameters that are free whatever is fitted. Active regions
-/// found at an inclination that is wrong would make up for it, and a search for the inclination would stay there.
+/// The parameters that are fitted, and those that are always free. Active regions that were found at a wrong
+/// inclination would compensate for it, and a search for the inclination would not leave it.
 #[derive(Clone, Copy, Debug)]
 pub struct Open<'a> {
-    /// Numbers that are fitted.
+    /// Fitted parameters.
     pub fitted: &'a [Parameter],
-    /// Parameters that are free.
+    /// Free parameters.
     pub free: &'a [FreeParameter],
 }
 
 impl Open<'_> {
-    /// Priors of parameters that are free, as in chains but for their shape.
+    /// Priors of free parameters, as in chains except for their shape.
     fn of_free(&self, values: &ParameterValues) -> Vec<StarPrior> {
         let is_open = |of: &&FreeParameter| GEOMETRY.contains(&of.parameter) && !self.fitted.contains(&of.parameter);
         let of = |&FreeParameter { parameter, prior }: &FreeParameter| {
@@ -74,11 +74,11 @@ impl Open<'_> {
     }
 }
 
-/// Parameters that active regions may make up for.
+/// Parameters whose errors active regions may absorb.
 const GEOMETRY: [Parameter; 4] = [Parameter::Inclination, Parameter::Vsini, Parameter::OmegaEq, Parameter::DOmega];
 
-/// The field where those parameters that are free are the most probable ones, active regions apart; `None` where none
-/// is free.
+/// The field with the most probable values of those parameters that are free, active regions excluded; `None` where
+/// none is free.
 ///
 /// # Errors
 /// [`NoFit`].
@@ -93,7 +93,7 @@ pub fn with_geometry(imager: &Imager, plain: &Fitted, known: &Known, open: Open)
     coarsely(imager, values, *known).map(Some)
 }
 
-/// Whether a number of active regions lies on a bound; no surface of theirs is none of it.
+/// Whether a parameter of active regions lies on a bound; zero surface is not a bound.
 fn is_at_bound(prior: &StarPrior, value: f64) -> bool {
     let (low, high) = prior.bounds;
     let near = 1e-6 * (high - low);
@@ -101,7 +101,7 @@ fn is_at_bound(prior: &StarPrior, value: f64) -> bool {
     Parameter::REGIONS.contains(&prior.parameter) && (is_low || value > high - near)
 }
 
-/// Full width at half maximum of the line of active regions (km/s), where no profile is as wide.
+/// Full width at half maximum of the line of active regions (km/s), where it exceeds that of every profile.
 pub fn too_wide_kms(imager: &Imager, star: &StarSettings) -> Option<f64> {
     let widest = |set: &Seen| {
         let bins = set.sampling.profiles.iter().map(|profile| profile.2).max().unwrap_or(0);
@@ -112,10 +112,10 @@ pub fn too_wide_kms(imager: &Imager, star: &StarSettings) -> Option<f64> {
     (!star.regions.are_plain() && fwhm_kms > range_kms).then_some(fwhm_kms)
 }
 
-/// Regions have to gain so much in ln Z, what their numbers are free to be counted against them.
+/// The gain in ln Z that regions require, with their free parameters counted against them.
 const NEEDED: f64 = 5.0;
 
-/// A number of the star that was fitted.
+/// A stellar parameter that was fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FittedNumber {
     /// Name of the parameter.
@@ -126,17 +126,17 @@ pub struct FittedNumber {
     pub sigma: f64,
 }
 
-/// The star as the profiles say it.
+/// The star as measured from the profiles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredStar {
-    /// What was fitted; nothing where spots that are the photosphere, dimmed, explain the profiles as well.
+    /// The fitted parameters; empty where spots that are dimmed photosphere explain the profiles equally well.
     pub numbers: Vec<FittedNumber>,
-    /// Size of what is wrong alike in all profiles of a data set, over the continuum; 0 for nothing.
+    /// Size of the error common to all profiles of a data set, relative to the continuum; 0 for none.
     #[serde(default)]
     pub mean_profile: f64,
-    /// What all of it gains in ln Z.
+    /// The total gain in ln Z.
     pub gain: f64,
-    /// Names of those numbers of active regions that the evidence drives to a bound.
+    /// Names of those parameters of active regions that the evidence drives to a bound.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub at_bounds: Vec<String>,
     /// Full width at half maximum of the line of active regions (km/s), where it is wider than the velocity range.
@@ -145,9 +145,9 @@ pub struct MeasuredStar {
 }
 
 impl MeasuredStar {
-    /// Of the profiles of `imager`, the other parameters as those of `plain` spots, from the field of these; and the
-    /// field that goes with it. Where line and regions together gain too little, regions alone: a line that is right as
-    /// it is does not count against them.
+    /// Measured from the profiles of `imager`, the other parameters as those of `plain` spots, starting from their
+    /// field; with the resulting field. Where line and regions together gain too little, regions alone: a line that is
+    /// right already does not count against them.
     ///
     /// # Errors
     /// [`NoFit`].
@@ -163,7 +163,7 @@ impl MeasuredStar {
         Ok(if alone.0.numbers.is_empty() { together } else { alone })
     }
 
-    /// The same by all that is `fitted` or nothing.
+    /// The same by all that is `fitted` or by nothing.
     fn by(imager: &Imager, plain: &Fitted, known: &Known, open: Open) -> Result<(Self, Assumed), NoFit> {
         let values = plain.marginal.values;
         let star = imager.star.with(&values.surface);
@@ -195,7 +195,7 @@ impl MeasuredStar {
         Ok((MeasuredStar { numbers, mean_profile, gain, at_bounds, too_wide_kms }, assumed))
     }
 
-    /// Puts what was found into what profiles are imaged with.
+    /// Sets the results in what profiles are imaged with.
     pub fn put_into(&self, imager: &mut Imager) {
         let mut values = ParameterValues::of_eight([0.0; 8]);
         self.set(&mut values, |_| true);
@@ -207,7 +207,7 @@ impl MeasuredStar {
         imager.mean_profile = self.mean_profile;
     }
 
-    /// Sets the parameters that are free to what was found: where searches begin.
+    /// Sets the free parameters to the results: where searches begin.
     pub fn set(&self, values: &mut ParameterValues, is_free: impl Fn(Parameter) -> bool) {
         for number in &self.numbers {
             if let Some(parameter) = Parameter::from_name(&number.name).filter(|parameter| is_free(*parameter)) {
@@ -216,7 +216,7 @@ impl MeasuredStar {
         }
     }
 
-    /// Why active regions as they were found cannot be, with a name for it.
+    /// Why the active regions as found are impossible, with a status for it.
     pub fn problem(&self) -> Option<String> {
         let words = |name: &String| name.trim_end_matches("_kms").replace('_', " ");
         let cure = "check velocity range and star.line, or set star.regions.area to 0";
@@ -232,7 +232,7 @@ impl MeasuredStar {
         (!names.is_empty()).then(|| format!("{all} at {plural} (region-at-bound): {cure}"))
     }
 
-    /// It in words.
+    /// A text.
     pub fn line(&self) -> String {
         let MeasuredStar { numbers, mean_profile, gain, .. } = self;
         if numbers.is_empty() {
@@ -265,7 +265,7 @@ mod tests {
         let high = |parameter: Parameter| prior(parameter).bounds.1;
         assert!(is_at_bound(&prior(Parameter::RegionLineWidth), high(Parameter::RegionLineWidth)));
         assert!(!is_at_bound(&prior(Parameter::RegionLineWidth), 1.3));
-        // none of the surface is a star without regions
+        // zero surface is a star without regions
         assert!(!is_at_bound(&prior(Parameter::RegionArea), 0.0));
         assert!(is_at_bound(&prior(Parameter::RegionArea), high(Parameter::RegionArea)));
         let at_bounds = vec!["region_line_width".to_owned(), "region_shift_kms".to_owned()];

@@ -1,11 +1,11 @@
-//! The target chi2 that the profiles themselves ask for: the highest below which the radial velocities that the image
-//! leaves over stop shrinking (Petit et al. 2015, section 3; `docs/method.md` section 3).
+//! The target chi2 from the profiles: the highest below which the filtered radial velocities of the image stop
+//! shrinking (Petit et al. 2015, section 3; `docs/method.md` section 3).
 //!
 //! Above it spots are still missing in the image; below, noise is turned into spots. Along the path of images the rms
-//! of the filtered velocities, observed minus modelled first moments, falls with lambda and then no more: the target is
-//! the chi2 at which a doubling of lambda is worth less than 3 %: the paper's 0.97 on its setup. Where the rms still
-//! shrinks at the lambda beyond which noise is turned into spots, which with the right model and errors it does not,
-//! that lambda is the end.
+//! of the filtered velocities, observed minus modelled first moments, falls with lambda and then stays constant: the
+//! target is the chi2 at which a doubling of lambda reduces it by less than 3 %: 0.97 on the setup of Petit et al.
+//! Where the rms still shrinks at the lambda beyond which noise is turned into spots, which does not happen with the
+//! right model and uncertainties, that lambda is the end.
 
 use crate::maxent::{Goal, Problem, Solution, Solver, SolverSettings, Start};
 use crate::model::ParameterValues;
@@ -14,13 +14,13 @@ use crate::surface::imaging::Imager;
 use crate::surface::static_map::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
 use serde::{Deserialize, Serialize};
 
-/// The velocities stop shrinking where a doubling of lambda leaves this much of them.
+/// The velocities stop shrinking where a doubling of lambda leaves this fraction of them.
 const STOPPED: f64 = 0.97;
 
-/// Images to each doubling of lambda.
+/// Images per doubling of lambda.
 const IMAGES: usize = 3;
 
-/// The walk begins at this lambda over the number of data, where a spotted star is fitted badly.
+/// The path begins at this lambda over the number of data, where a spotted star is fitted badly.
 const FIRST: f64 = 0.1;
 
 /// A target that was chosen.
@@ -30,7 +30,7 @@ pub struct ChosenTarget {
     pub value: f64,
     /// Standard deviation of the filtered velocities there (km/s).
     pub filtered_rv_rms_kms: f64,
-    /// The share of it that a doubling of lambda leaves.
+    /// The fraction of it that remains after a doubling of lambda.
     pub left_by_doubling: f64,
     /// Whether it still shrinks there, because beyond noise is turned into spots.
     pub still_shrinking: bool,
@@ -40,7 +40,7 @@ pub struct ChosenTarget {
 }
 
 impl ChosenTarget {
-    /// It in a line.
+    /// One line of text.
     pub fn line(&self) -> String {
         let left = 100.0 * (1.0 - self.left_by_doubling);
         let ChosenTarget { value, filtered_rv_rms_kms, .. } = self;
@@ -64,8 +64,7 @@ struct Place {
     rms_kms: f64,
 }
 
-/// The target at `values`, for data of which noise correlated over `correlated_bins`: per datum, not per independent
-/// one.
+/// The target at `values`, for data with noise correlated over `correlated_bins`: per datum, not per independent one.
 ///
 /// # Errors
 /// If the solver fails.
@@ -74,10 +73,10 @@ pub fn choose(imager: &Imager, values: ParameterValues, correlated_bins: f64) ->
     let left: Vec<f64> = path.windows(IMAGES + 1).map(|p| p[IMAGES].rms_kms / p[0].rms_kms).collect();
     let last = left.len() - 1;
     let (k, part) = match left.iter().rposition(|left| *left < STOPPED) {
-        // what spots do not explain at all says nothing of them
+        // velocities that spots do not explain at all do not constrain spots
         None => (last, 0.0),
         Some(k) if k == last => (last, 0.0),
-        // between the last image that still gains and the first that does not
+        // between the last image with a gain and the first without one
         Some(k) => (k, (STOPPED - left[k]) / (left[k + 1] - left[k])),
     };
     let between = |a: f64, b: f64| a + part * (b - a);
@@ -91,7 +90,7 @@ pub fn choose(imager: &Imager, values: ParameterValues, correlated_bins: f64) ->
     })
 }
 
-/// To four decimals: the last bits of a search for a target mean nothing, and everything after it hangs on them.
+/// Four decimals: the last bits of a search for a target are not significant, and all later results depend on them.
 fn rounded(chi2: f64) -> f64 {
     (1e4 * chi2).round() / 1e4
 }
@@ -131,7 +130,7 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
     }
 }
 
-/// First moment (km/s) of every profile, of `depths` in the bins of the data.
+/// First moment (km/s) of every profile with these `depths` in the bins of the data.
 fn moments(imager: &Imager, depths: &[f64]) -> Vec<f64> {
     let mut first = 0;
     let moment = |(step_kms, (time_d, first_velocity_kms, bins)): (f64, (f64, f64, usize))| {

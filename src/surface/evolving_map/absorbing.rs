@@ -1,9 +1,9 @@
-//! Fields of spots that absorb more of an orbit than the most probable one.
+//! Fields of spots that absorb more of an orbit than the most probable field.
 //!
-//! Where a planet is not in the model, a fit of the field explains a part of its orbit by spots. On two stars without a
-//! jitter (24 and 34 profiles, spots of 9 and 40 d) orbits of 0.1 to 0.4 km/s shortened the lifetime by factors of 1.1
-//! to 20; the slope rose by 0.3 for each factor of e, and the amplitude stayed. With the lifetime given, slope and
-//! amplitude rose together. So fields lie on one line, and a few steps along it are enough.
+//! Without a planet in the model, a fit of the field absorbs part of its orbit in spots. On two stars without a jitter
+//! (24 and 34 profiles, spot lifetimes of 9 and 40 d) orbits of 0.1 to 0.4 km/s shortened the lifetime by factors of
+//! 1.1 to 20; the slope rose by 0.3 for each factor of e, and the amplitude stayed. With the lifetime given, slope and
+//! amplitude rose together. So fields lie on one line, and a few steps along it suffice.
 
 use super::climb::{assumed_at, limits, place};
 use super::{Fitted, Known, Marginal};
@@ -17,16 +17,15 @@ const STEP: [f64; 3] = [0.0, 0.2, -LN_2];
 /// The same where the lifetime is given.
 const STEP_OF_GIVEN_LIFETIME: [f64; 3] = [0.1, 0.4, 0.0];
 
-/// The last step lowers ln Z by this at most: what an orbit of Delta ln L 40 costs the star without a planet is half of
-/// it.
+/// The last step lowers ln Z by at most this: an orbit of Delta ln L 40 costs the star without a planet half of it.
 const FALL: f64 = 100.0;
 
 impl Fitted {
-    /// What is made `of` the star with fields that absorb less and more: one step back, the field that was fitted, and
-    /// steps onwards. Numbers that are `known` stay, and so there may be that field alone.
+    /// Results `of` the star with fields that absorb less and more: one step back, the fitted field, and steps onwards.
+    /// `known` parameters are fixed, and so there may be only that field.
     ///
     /// # Errors
-    /// Those of `of`. Where there is no star with a field, there are no further steps.
+    /// Those of `of`. Where no star with a field is found, there are no further steps.
     pub(super) fn absorbing<T, E>(
         &self,
         imager: &Imager,
@@ -58,7 +57,7 @@ impl Fitted {
         all.push(of(here)?);
         let onwards =
             |from: &Marginal| next(from, 1.0).filter(|further| known.height(further) > known.height(here) - FALL);
-        // of many profiles each star is hundreds of megabytes: one is kept
+        // with many profiles each star takes hundreds of megabytes: one is kept
         let mut further = onwards(here);
         while let Some(there) = further {
             all.push(of(&there)?);

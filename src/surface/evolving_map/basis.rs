@@ -1,14 +1,14 @@
-//! The harmonics that maps are made of, on the pixels of a star.
+//! The harmonics of the maps, on the pixels of a star.
 
 use super::{DEGREE, MEAN_FILLING};
 use crate::field::{Compression, Degrees, Harmonics, Settling, Spectrum};
 use crate::star::SurfaceGrid;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-/// Pixels at which changes of the maps are watched, about.
+/// Approximate number of pixels at which changes of the maps are monitored.
 const WATCHED: usize = 150;
 
-/// How exactly maps are found where differences of ln Z need be good to a few tenths only.
+/// Precision of maps where differences of ln Z need an accuracy of only a few tenths.
 const ROUGH: f64 = 5e-3;
 
 /// The harmonics on the pixels of a map.
@@ -18,16 +18,16 @@ pub struct Basis {
     pub degrees: Degrees,
     /// The harmonics (pixels, H).
     pub on_pixels: DMatrix<f64>,
-    /// The harmonics (points, H) where changes of the maps are watched.
+    /// The harmonics (points, H) where changes of the maps are monitored.
     pub(super) watched: DMatrix<f64>,
-    /// How exactly maps are found.
+    /// Precision of the maps.
     pub(super) settling: Settling,
-    /// Times that maps are found with a jitter, along their slopes from time to time.
+    /// Iterations of maps with a jitter, each along the slopes of the previous ones.
     pub(super) jittered: usize,
 }
 
 impl Basis {
-    /// All, on the pixels of `grid`, maps exact enough for ln Z to some 0.03.
+    /// All harmonics on the pixels of `grid`, with maps precise enough for ln Z to some 0.03.
     pub fn new(grid: &SurfaceGrid) -> Self {
         Basis::up_to(grid, DEGREE)
     }
@@ -46,31 +46,31 @@ impl Basis {
         }
     }
 
-    /// The same where ln Z is compared with that of neighbours: maps exact enough for ln Z to some 0.003.
+    /// The same where ln Z is compared with that of neighbours: maps precise enough for ln Z to some 0.003.
     #[must_use]
     pub fn exactly(self) -> Self {
         let settling = Settling { tolerance: 2e-4, ..Settling::default() };
         Basis { settling, jittered: 2, ..self }
     }
 
-    /// The same where differences of ln Z need be good to a few tenths only.
+    /// The same where differences of ln Z need an accuracy of only a few tenths.
     pub fn rough(grid: &SurfaceGrid) -> Self {
         Basis::new(grid).roughly()
     }
 
-    /// The same with harmonics up to a lower degree, which tell of large spots only.
+    /// The same with harmonics up to a lower degree, which resolve only large spots.
     pub(super) fn coarse(grid: &SurfaceGrid, degree: usize) -> Self {
         Basis::up_to(grid, degree).roughly()
     }
 
-    /// These harmonics, differences of ln Z good to a few tenths.
+    /// These harmonics, with differences of ln Z accurate to a few tenths.
     #[must_use]
     pub(super) fn roughly(&self) -> Self {
         let compression = Compression { left_out: 0.03 };
         Basis { settling: Settling { tolerance: ROUGH, compression, ..Settling::default() }, ..self.clone() }
     }
 
-    /// Whether they are so.
+    /// Whether they have that accuracy.
     pub(super) fn is_rough(&self) -> bool {
         self.settling.tolerance >= ROUGH
     }
@@ -85,9 +85,9 @@ impl Basis {
         self.degrees.is_empty()
     }
 
-    /// Variance of each pixel by those that no data see.
+    /// Variance of each pixel by harmonics to which no data are sensitive.
     pub(super) fn unseen_variances(&self, spectrum: &Spectrum) -> DVector<f64> {
-        // together harmonics of all degrees have that of the field everywhere
+        // together harmonics of all degrees have the variance of the field everywhere
         let seen = spectrum.variances(&self.degrees);
         let left = |pixel: RowDVector<f64>| {
             let of_seen: f64 = pixel.iter().zip(&seen).map(|(y, variance)| y * y * variance).sum();

@@ -1,11 +1,10 @@
-//! Whether the star changes while it is observed: ln Z of a field that lives for some time against that of one that
-//! lives for ever, with the best orbit in the model on both sides. Without it a planet of 100 m/s alone makes a star
-//! look changing.
+//! The test for spot evolution: ln Z of a field with a finite lifetime compared with that of a static one, with the
+//! best orbit in the model on both sides. Without it a planet of 100 m/s alone would appear as evolving spots.
 //!
-//! A usual field that lives for ever, with the best orbit, comes first. Where shorter lifetimes gain nothing the star
-//! does not change. Otherwise the field that lives for ever is fitted, and again its lifetime is shortened, all else
-//! kept: where that gains enough the star changes, and where it gains nothing it does not. In between, the changing
-//! field is fitted as well, with an orbit of its own.
+//! A usual static field with the best orbit comes first. Where shorter lifetimes gain nothing the spots do not evolve.
+//! Otherwise the static field is fitted, and its lifetime is shortened again, all else kept: where that gains enough
+//! the spots evolve, and where it gains nothing they do not. In between, the evolving field is fitted as well, with its
+//! own orbit.
 
 use super::Known;
 use super::fit::{Fitted, NoFit, fit, share_of_many, usual};
@@ -19,19 +18,19 @@ use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A star changes where that gains more than this in ln Z: odds of 150 to 1.
+/// Spots evolve where that gains more than this in ln Z: odds of 150 to 1.
 pub const CHANGES: f64 = 5.0;
 
 /// Lifetimes that are tried, in time bases, from long to short.
 const LIFETIMES: [f64; 6] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25];
 
-/// Below this gain of the best of them a fit will not find [`CHANGES`].
+/// Below this gain of the best of them a fit will not reach [`CHANGES`].
 const NOTHING: f64 = 0.5;
 
-/// Shorter lifetimes are tried no further where ln Z is so far below the best.
+/// Lifetimes are shortened no further where ln Z is this far below the best.
 const FAR_BELOW: f64 = 10.0;
 
-/// Whether a season has profiles enough to show a change.
+/// Whether a season has enough profiles to show evolution.
 fn tells(season: &Imager) -> bool {
     const FEWEST: usize = 4;
     season.profiles().count() >= FEWEST
@@ -40,19 +39,19 @@ fn tells(season: &Imager) -> bool {
 /// The comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
-    /// ln Z of the best changing field that was tried over that of the best one that does not change.
+    /// ln Z of the best evolving field that was tried relative to that of the best static one.
     pub ln_evidence_gain: f64,
     /// Lifetime of its spots (d).
     pub spot_lifetime_d: f64,
 }
 
 impl Change {
-    /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out: of
-    /// the season in which the star changes most. Of many profiles a share is asked first, which shows most changes at
-    /// a small part of the work.
+    /// Compares both for the profiles of `imager`, all but the orbit as in `values`, marginalised over the `nuisances`:
+    /// the season with the strongest evolution. With many profiles a subset comes first, which reveals most evolution
+    /// at a small fraction of the cost.
     ///
     /// # Errors
-    /// [`NoFit`] where the field that does not change cannot be fitted in some season, and no other one shows a change.
+    /// [`NoFit`] where the static field cannot be fitted in some season, and no other one shows evolution.
     pub fn of(
         imager: &Imager,
         values: ParameterValues,
@@ -117,12 +116,12 @@ impl Change {
         })
     }
 
-    /// Whether the star changes.
+    /// Whether the spots evolve.
     pub fn is_changing(&self) -> bool {
         self.ln_evidence_gain > CHANGES
     }
 
-    /// What is to be said of it where it does.
+    /// The message where they do.
     pub fn sentence(&self) -> String {
         format!(
             "significant spot evolution (Δln Z = {:.0}, spot lifetime ≈ {:.2} d) invalidates the static-map model: use \
@@ -164,7 +163,7 @@ fn shortened(
         let gain = marginal.ln_evidence() - still.ln_evidence;
         last = marginal.clone();
         match &best {
-            // a little change already is too much
+            // slight evolution already is too much
             None if gain < -CHANGES => {
                 best = Some(Shortened { lifetime_d, gain, marginal });
                 break;

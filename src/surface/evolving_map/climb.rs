@@ -1,4 +1,4 @@
-//! The way up to the most probable field, by quasi-Newton steps in ln amplitude, slope, ln lifetime and ln jitter.
+//! The climb to the most probable field, by quasi-Newton steps in ln amplitude, slope, ln lifetime and ln jitter.
 
 use super::known::Known;
 use super::{Assumed, Marginal};
@@ -6,21 +6,21 @@ use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::model::Parameter;
 use nalgebra::{Matrix4, Vector4};
 
-/// Bounds of a jitter (km/s); that of none is 0.
+/// Bounds of a jitter (km/s); without one it is 0.
 const JITTER_KMS: (f64, f64) = (1e-3, 3.0);
 
-/// A search ends when a step would gain less than this in ln Z, or after so many.
+/// A search ends when a step would gain less than this in ln Z, or after so many steps.
 pub(super) const GAIN: f64 = 0.02;
 pub(super) const STEPS: usize = 25;
 
 /// Step of the derivatives of ln Z: errors of ln Z of 0.03 are some 10 in its second derivative.
 const STEP: f64 = 0.1;
 
-/// Second derivatives of minus ln Z that are larger than this say something; otherwise errors of 10 % are usual.
+/// Second derivatives of minus ln Z larger than this are significant; otherwise uncertainties of 10 % are usual.
 pub(super) const LEAST_BEND: f64 = 10.0;
 pub(super) const USUAL_BEND: f64 = 100.0;
 
-/// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the step before.
+/// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the previous step.
 const LONGEST: f64 = 0.35;
 
 /// ln amplitude, slope, ln lifetime, ln jitter.
@@ -53,14 +53,14 @@ pub(super) fn limits(known: &Known) -> [(f64, f64); 4] {
     [amplitude, slope, lifetime, (JITTER_KMS.0.ln(), JITTER_KMS.1.ln())]
 }
 
-/// Where a climb ends, and what its steps tell of minus the second derivatives of ln Z.
+/// The end of a climb, with the estimate by its steps of minus the second derivatives of ln Z.
 pub(super) struct Top {
     pub marginal: Marginal,
     pub hessian: Matrix4<f64>,
 }
 
-/// The way up from `first` by so many quasi-Newton steps at most (BFGS; Nocedal & Wright 2006, chapter 6), within the
-/// bounds. How the numbers depend on each other is as in the second derivatives `nearby`, if there are any.
+/// A climb from `first` by at most so many quasi-Newton steps (BFGS; Nocedal & Wright 2006, chapter 6), within the
+/// bounds. Correlations of the parameters are those of the second derivatives `nearby`, if there are any.
 pub(super) fn climb(
     first: Marginal,
     known: &Known,
@@ -70,12 +70,12 @@ pub(super) fn climb(
 ) -> Result<Top, FieldError> {
     let (free, limits) = (known.free(&first.assumed), limits(known));
     let height = |of: &Marginal| known.height(of);
-    // gradient, and minus the second derivatives along each number. Derivatives at fixed maps are not enough: the
-    // determinant changes with the maps, and outweighs the rest
+    // gradient, and minus the second derivatives along each parameter. Derivatives at fixed maps are not sufficient:
+    // the determinant changes with the maps, and outweighs the rest
     let slope = |of: &Marginal| {
         let from = place(&of.assumed);
         if free.contains(&true) {
-            // once, before two ask for it
+            // once, before two threads need it
             of.settled.evidence.explained();
         }
         let beside = |i: usize, h: f64| {
@@ -111,7 +111,7 @@ pub(super) fn climb(
     hessian.component_mul_assign(&(scale * scale.transpose()));
     for taken in 1..=steps {
         let from = place(&here.assumed);
-        // what pushes against a bound stays there
+        // parameters that are pushed against a bound stay there
         let pushes = |i: usize| {
             let (low, high) = limits[i];
             (from[i] <= low + 1e-9 && gradient[i] < 0.0) || (from[i] >= high - 1e-9 && gradient[i] > 0.0)
@@ -145,7 +145,7 @@ pub(super) fn climb(
     Ok(Top { marginal: here, hessian })
 }
 
-/// The first of ever shorter steps that leads up; `None` where none does.
+/// The first of progressively shorter steps that leads up; `None` where none does.
 fn shortened(
     here: &Marginal,
     mut step: Vector4<f64>,
@@ -153,7 +153,7 @@ fn shortened(
     (limits, height): (&[(f64, f64); 4], &impl Fn(&Marginal) -> f64),
     at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
 ) -> Option<Marginal> {
-    // shorter ones gain less than a tenth of what was hoped for
+    // shorter ones gain less than a tenth of the expected gain
     const TRIES: usize = 4;
     let from = place(&here.assumed);
     for _ in 0..TRIES {

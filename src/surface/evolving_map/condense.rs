@@ -1,7 +1,7 @@
-//! From the bins of a profile to the few numbers that hold what it says of spots, line and velocity
-//! (`docs/method.md` section 9): in units of the noise, along directions that hold what any spots would make of it.
+//! Data compression from the bins of a profile to a few coefficients that contain its information on spots, line and
+//! velocity (`docs/method.md` section 9): in units of the noise, along the directions of the effects of any spots.
 //!
-//! All else is noise, and the same for all parameters. Half as many numbers as bins is half the time of everything.
+//! The rest is noise, and the same for all parameters. Half as many coefficients as bins halve the computing time.
 
 use super::Basis;
 use crate::field::{Compression, Spectrum, leading_directions, with_directions};
@@ -13,29 +13,29 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Spots of which no more than [`LEFT_OUT`] of the variance of the noise is lost in a profile: rougher and larger than
-/// any. Those of slope 0 and an amplitude of 0.85 have less at every degree.
+/// Spots for which a profile loses no more than [`LEFT_OUT`] of the variance of the noise: rougher and larger than any.
+/// Those of slope 0 and an amplitude of 0.85 have less at every degree.
 pub(super) const ROUGHEST: Spectrum = Spectrum { amplitude: 1.0, slope: 0.3, break_degree: 0.0 };
 const LEFT_OUT: f64 = 1e-3;
 
-/// The profiles in those numbers.
+/// The compressed profiles.
 #[derive(Clone, Debug)]
 pub(super) struct Condensed {
-    /// From bins to numbers (numbers, bins).
+    /// From bins to coefficients (coefficients, bins).
     rows: Vec<DMatrix<f64>>,
     /// Depths.
     pub data: Vec<DVector<f64>>,
-    /// Nuisances of line and continuum (numbers, nuisances).
+    /// Nuisances of line and continuum (coefficients, nuisances).
     pub nuisances: Vec<DMatrix<f64>>,
-    /// What may be wrong alike in all profiles, for a size of 1 (numbers, columns); no columns where nothing may.
+    /// Errors common to all profiles, for a size of 1 (coefficients, columns); no columns without such errors.
     pub mean_profile: Vec<DMatrix<f64>>,
-    /// ln of the density of what is left of the bins.
+    /// ln of the density of the remaining directions of the bins.
     pub beside: Vec<f64>,
 }
 
 impl Condensed {
-    /// Of profiles for which each harmonic makes `lines` (bins, H), and a star without spots `bare` (all bins), seen
-    /// through `response` at `state`.
+    /// Compresses profiles for which the harmonics have the `lines` (bins, H), and a star without spots is `bare` (all
+    /// bins), seen through `response` at `state`.
     pub fn new(
         imager: &Imager,
         basis: &Basis,
@@ -90,13 +90,13 @@ impl Condensed {
         condensed
     }
 
-    /// Columns over the bins of profile `k` in its numbers.
+    /// Compresses columns over the bins of profile `k`.
     pub fn tell(&self, k: usize, columns: &DMatrix<f64>) -> DMatrix<f64> {
         &self.rows[k] * columns
     }
 }
 
-/// How the depths of a star without spots change with its velocity.
+/// Derivatives with velocity of the depths of a star without spots.
 fn bare_slopes(imager: &Imager, response: &Response, state: &StarState) -> Vec<f64> {
     let bare = vec![1.0; response.pixels()];
     let at = |h: f64| {

@@ -1,5 +1,5 @@
-//! How dark spots are in one data set beside the others: the contrast for which ln Z is largest, the field and all else
-//! held. It is told by the profiles, because the same spots are in those of the other data sets.
+//! The spot contrast of one data set relative to the others: the contrast for which ln Z is largest, the field and all
+//! else held. The profiles constrain it, because the same spots appear in those of the other data sets.
 
 use super::star::DEGREE;
 use super::{Basis, Design, Fitted, Marginal};
@@ -8,15 +8,15 @@ use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Standard deviation of the prior of ln(1 - contrast) around what the config says: optical spots are some three times
-/// fainter in the near infrared.
+/// Standard deviation of the prior of ln(1 - contrast) around the value of the config: optical spots are some three
+/// times fainter in the near infrared.
 const PRIOR: f64 = 0.7;
 
-/// Least and largest `1 - contrast`.
+/// Smallest and largest `1 - contrast`.
 const DARKNESS: (f64, f64) = (0.02, 1.0);
 
-/// A climb of ln(1 - contrast) begins with differences of this step, goes at most so far at once, and ends when it
-/// moves by less than a share of its error, or after so many steps.
+/// A climb of ln(1 - contrast) begins with differences of this step, has steps no longer than the next value, and ends
+/// when it moves by less than a fraction of its uncertainty, or after so many steps.
 const STEP: f64 = 0.1;
 const LONGEST: f64 = 0.7;
 const SETTLED: f64 = 0.1;
@@ -32,13 +32,13 @@ pub struct FittedContrast {
 }
 
 impl FittedContrast {
-    /// Whether spots would have to be darker than black for it.
+    /// Whether it would require spots darker than black.
     pub fn is_at_bound(&self) -> bool {
         self.value < 1e-6
     }
 }
 
-/// The contrast of spots in a data `set` by the field of `near`, its prior around that which is `given`.
+/// The spot contrast of a data `set` by the field of `near`, its prior around the `given` value.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -57,7 +57,7 @@ pub fn fit_contrast(imager: &Imager, near: &Fitted, set: usize, given: f64) -> R
     let (mut place, mut step) = (here.clamp(bounds.0, bounds.1), STEP);
     let mut bend = PRIOR.powi(-2);
     for _ in 0..STEPS {
-        // within the bounds, where the middle one is not the best by much: a parabola through three
+        // within the bounds, where the middle point may not be the highest: a parabola through three
         let middle = place.clamp(bounds.0 + step, bounds.1 - step);
         let [below, here, above] = [-1.0, 0.0, 1.0].map(|side| height(middle + side * step));
         let (below, here, above) = (below?, here?, above?);

@@ -23,7 +23,7 @@ impl FieldRecord {
         }
     }
 
-    /// What is no parameter.
+    /// The assumptions that are not parameters.
     pub(super) fn held(&self) -> Held {
         Held { break_degree: self.spot_break_degree, jitter_kms: self.velocity_jitter_kms }
     }
@@ -66,7 +66,7 @@ impl SurfaceDensity for MarginalPosterior {
         Surrogate::of_expansion(self.expansion().ok()?, self.space(), self.imager())
     }
 
-    /// It is the density's own expansion.
+    /// It is the density's expansion.
     fn fitted(&self, surrogate: Surrogate, evaluator: &dyn Evaluator) -> (Surrogate, f64) {
         match self.finds_only_maps_anew() {
             true => {

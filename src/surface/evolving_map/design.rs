@@ -1,4 +1,4 @@
-//! The star's side of the marginal likelihood: what profiles each harmonic makes.
+//! The star's side of the marginal likelihood: the profiles of each harmonic.
 
 use super::MEAN_FILLING;
 use super::basis::Basis;
@@ -13,42 +13,43 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Line depth and continuum of every profile for each harmonic, before the division of one by the other; depths in the
-/// few numbers that hold them.
+/// Line depth and continuum of every profile for each harmonic, before the division of one by the other; depths in
+/// compressed form.
 #[derive(Clone, Debug)]
 pub struct Design {
     response: Response,
     condensed: Arc<Condensed>,
-    /// Of each profile (H, numbers).
+    /// Line depths per profile (H, coefficients).
     line: Vec<Arc<DMatrix<f64>>>,
-    /// (H, profiles).
+    /// Continua (H, profiles).
     continuum: DMatrix<f64>,
-    /// The same of a star that is spotted alike all over, as much as stars of which nothing else is known.
+    /// The same for a uniformly spotted star, with the mean filling factor of the field.
     mean_line: Vec<DVector<f64>>,
     mean_continuum: Vec<f64>,
     light: Light,
-    /// How depths change with a velocity, where that is asked for often.
+    /// Derivatives of the depths with velocity, where they are needed often.
     moving: Option<Arc<Moving>>,
 }
 
-/// Change of the line depth of every profile by a velocity (km/s).
+/// Derivatives of the line depth of every profile with velocity (per km/s).
 #[derive(Debug)]
 struct Moving {
-    /// The star at whose velocities it is.
+    /// The star to whose velocities they apply.
     state: StarState,
-    /// For each harmonic, of each profile (H, numbers).
+    /// For each harmonic, per profile (H, coefficients).
     line: Vec<DMatrix<f64>>,
-    /// Of a star that is spotted alike all over.
+    /// For a uniformly spotted star.
     mean_line: Vec<DVector<f64>>,
 }
 
 impl Design {
-    /// Of the star in `imager` at `state`. A model application a harmonic.
+    /// The design of the star in `imager` at `state`, by one model application per harmonic.
     pub fn new(imager: &Imager, basis: &Basis, state: &StarState) -> Self {
         Design::of(imager, basis, (imager.response(state), state), None)
     }
 
-    /// Seen through a response at a state, in the numbers of a design that is `like` this one, of a star near by.
+    /// The design seen through a response at a state, in the coefficients of a design that is `like` this one, of a
+    /// similar star.
     pub fn of(
         imager: &Imager,
         basis: &Basis,
@@ -67,8 +68,8 @@ impl Design {
         Design { response, condensed, line, continuum, mean_line, mean_continuum, light, moving: None }
     }
 
-    /// With how depths change with the velocities of the star at `state`, that of the design. It is the work of two
-    /// designs, and a chain takes a tenth less; a fit with its few dozen maps takes as long as without.
+    /// Adds derivatives of the depths with the velocities of the star at `state`, that of the design. They cost as much
+    /// as two designs and save a chain a tenth of its time; a fit with its few dozen maps takes as long as without.
     #[must_use]
     pub fn moving(mut self, imager: &Imager, basis: &Basis, state: &StarState) -> Self {
         let at = |h: f64| {
@@ -86,8 +87,8 @@ impl Design {
         self
     }
 
-    /// How the numbers of each profile change with its velocity, for maps of these coefficients (H, epochs), if that is
-    /// known for the star at `state` without a look at the pixels.
+    /// Derivatives of the coefficients of each profile with its velocity, for maps of these coefficients (H, epochs),
+    /// if they are known for the star at `state` without recomputing the pixels.
     pub(super) fn known_slopes(&self, state: &StarState, maps: &DMatrix<f64>) -> Option<Vec<DMatrix<f64>>> {
         let moving = self.moving.as_ref().filter(|moving| moving.state == *state)?;
         let slope = |k: usize| {
@@ -97,13 +98,13 @@ impl Design {
         Some((0..self.response.profiles()).map(slope).collect())
     }
 
-    /// Columns over the bins of each profile in its numbers.
+    /// Columns over the bins of each profile, compressed.
     pub fn condensed(&self, columns: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
         columns.iter().enumerate().map(|(k, columns)| self.condensed.tell(k, columns)).collect()
     }
 
-    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, epochs), as
-    /// each profile sees it.
+    /// Brightness relative to the photosphere (pixels, profiles) of maps with these `coefficients` (H, epochs), at each
+    /// profile.
     pub fn brightness(&self, basis: &Basis, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
         let mut brightness = basis.filling(&coefficients.columns(0, self.response.profiles()).into_owned());
         for (k, mut map) in brightness.column_iter_mut().enumerate() {
@@ -113,8 +114,8 @@ impl Design {
         brightness
     }
 
-    /// What the data tell of the harmonics `of` one degree (harmonics, harmonics): `J^T N^-1 J` of lines, of continua
-    /// by which they are divided, and of light curves, each for itself, summed.
+    /// Information of the data on the harmonics `of` one degree (harmonics, harmonics): the sum of `J^T N^-1 J` of
+    /// lines, of continua by which they are divided, and of light curves.
     pub(super) fn information(&self, imager: &Imager, of: Range<usize>) -> DMatrix<f64> {
         let mut information = self.light.information(imager, of.clone());
         for (k, line) in self.line.iter().enumerate() {
@@ -128,7 +129,7 @@ impl Design {
         information
     }
 
-    /// The response that it was made with.
+    /// The response of the design.
     pub fn response(&self) -> &Response {
         &self.response
     }
@@ -138,8 +139,8 @@ impl Design {
         self.divided(k, (&self.line[k], &self.mean_line[k]), coefficients)
     }
 
-    /// The line of profile `k` for a map of these coefficients over its continuum, and that, given what each harmonic
-    /// makes of the line (H, numbers), and a star that is spotted alike all over.
+    /// The line of profile `k` for a map of these coefficients divided by its continuum, and that continuum, given the
+    /// line of each harmonic (H, coefficients) and of a uniformly spotted star.
     fn divided(
         &self,
         k: usize,
@@ -159,7 +160,7 @@ impl Design {
         let epoch = |k: usize| self.epoch((times_d[k], imager.mean_profile), k, &maps.column(k).into_owned());
         let mut epochs: Vec<Epoch> = (0..profiles).into_par_iter().map(epoch).collect();
         epochs.extend(self.light.epochs(imager, maps.columns_range(profiles..)));
-        // numbers of profiles first, then those of light curves
+        // common columns of profiles first, then those of light curves
         let of_profiles = epochs.first().map_or(0, |epoch| epoch.common.ncols());
         let of_light = epochs.get(profiles).map_or(0, |epoch| epoch.common.ncols());
         if of_profiles > 0 && of_light > 0 {
@@ -174,15 +175,15 @@ impl Design {
         epochs
     }
 
-    /// What is wrong alike in all profiles, most probable for maps of these coefficients (H, epochs): a number for each
-    /// of the columns of [`mean_profile`](crate::surface::mean_profile); none where nothing may be.
+    /// Most probable errors common to all profiles for maps of these coefficients (H, epochs): one value for each of
+    /// the columns of [`mean_profile`](crate::surface::mean_profile); none where they are not modelled.
     pub(super) fn mean_profile(&self, imager: &Imager, maps: &DMatrix<f64>) -> DVector<f64> {
         let epochs = &self.epochs(imager, maps)[..self.response.profiles()];
         let numbers = self.condensed.mean_profile.first().map_or(0, DMatrix::ncols);
         let (mut inner, mut along) = (DMatrix::identity(numbers, numbers), DVector::zeros(numbers));
         for (epoch, alike) in epochs.iter().zip(&self.condensed.mean_profile) {
             let alike = alike * imager.mean_profile;
-            // numbers are in units of the noise; nuisances of the profile take what they may
+            // coefficients are in units of the noise; nuisances of the profile add to it
             let mut noise = &epoch.nuisances * epoch.nuisances.transpose();
             (0..noise.nrows()).for_each(|i| noise[(i, i)] += 1.0);
             let Some(factor) = noise.cholesky() else { continue };
@@ -218,7 +219,7 @@ fn of_harmonics(response: &Response, basis: &Basis) -> (Vec<DMatrix<f64>>, DMatr
         response.change(map, &mut line, &mut continuum);
         (line, continuum)
     };
-    // of many profiles it is hundreds of megabytes
+    // with many profiles it takes hundreds of megabytes
     let columns: Vec<(Vec<f64>, Vec<f64>)> =
         (0..basis.len()).into_par_iter().map(|h| change(basis.on_pixels.column(h).as_slice())).collect();
     let of_profile = |k: usize| {
@@ -233,12 +234,12 @@ fn of_harmonics(response: &Response, basis: &Basis) -> (Vec<DMatrix<f64>>, DMatr
     (lines, DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]))
 }
 
-/// Lines (bins, H) of each profile in its numbers, turned (H, numbers).
+/// Lines (bins, H) of each profile compressed and transposed (H, coefficients).
 fn told(condensed: &Condensed, lines: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
     lines.par_iter().enumerate().map(|(k, line)| condensed.tell(k, line).transpose()).collect()
 }
 
-/// Depths of all bins in the numbers of each profile.
+/// Depths of all bins, compressed per profile.
 fn told_each(condensed: &Condensed, response: &Response, depths: &[f64]) -> Vec<DVector<f64>> {
     let of_profile = |k: usize| {
         let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &depths[response.bins(k)]);
@@ -247,7 +248,7 @@ fn told_each(condensed: &Condensed, response: &Response, depths: &[f64]) -> Vec<
     (0..response.profiles()).map(of_profile).collect()
 }
 
-/// Line depth and continuum of every profile of a star that is spotted alike all over.
+/// Line depth and continuum of every profile of a uniformly spotted star.
 fn uniform(response: &Response, filling: f64) -> (Vec<f64>, Vec<f64>) {
     let mut map = vec![0.0; response.pixels()];
     let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);

@@ -1,7 +1,8 @@
-//! How well the profiles tell the field: standard errors of amplitude, slope and lifetime from the second derivatives
-//! of ln Z and its priors, the jitter held (Laplace's approximation; MacKay 2003, chapter 27).
+//! Uncertainties of the field: standard errors of amplitude, slope and lifetime from the second derivatives of ln Z and
+//! its priors, the jitter held (Laplace's approximation; MacKay 2003, chapter 27).
 //!
-//! Each field has its own maps. ln Z is known to a few hundredths only, and so differences span about a standard error.
+//! Each field has its own maps. ln Z is accurate to a few hundredths only, and so differences span about a standard
+//! error.
 
 use super::climb::{assumed_at, limits, place};
 use super::fit::takes_minutes;
@@ -18,17 +19,17 @@ const STEP: [f64; 3] = [0.15, 0.4, 0.3];
 /// Steps are a standard error, but between a third of a usual one and this many.
 const MOST: f64 = 2.0;
 
-/// Of the width between the bounds a step is this part at most.
+/// A step is at most this fraction of the width between the bounds.
 const PART: f64 = 0.4;
 
-/// Second derivatives for a step of 1 that are smaller are the noise of ln Z: the profiles leave that number open.
+/// Smaller second derivatives for a step of 1 are the noise of ln Z: the profiles do not constrain that parameter.
 const LEAST: f64 = 0.3;
 
-/// Numbers of the field by their place, with the steps along them.
+/// Indices of the field's parameters, with the steps along them.
 type Steps = Vec<(usize, f64)>;
 
 impl Fitted {
-    /// Those of what is not known beforehand, not at a bound and not left open, all of these free together; none where
+    /// Those of parameters that are not given, not at a bound and constrained, all of these free together; none where
     /// they would take minutes.
     pub(super) fn errors(&self, imager: &Imager, known: &Known) -> FieldErrors {
         let here = &self.marginal;
@@ -40,12 +41,12 @@ impl Fitted {
         let within = |i: usize, step: f64| (i, step.min(PART * (limits[i].1 - limits[i].0)));
         let all = (0..3).filter(|i| free[*i] && !is_at_bound(i)).map(|i| within(i, STEP[i]));
         let usual: Steps = all.filter(|(_, step)| *step > 0.0).collect();
-        // once, before two ask for it
+        // once, before two threads need it
         here.settled.evidence.explained();
         let height = |steps: &Steps, moves: &[f64]| {
             let mut to = top;
             for ((i, step), times) in steps.iter().zip(moves) {
-                // beside a bound the differences are those around a place that leaves room for them
+                // next to a bound the differences are around a point that leaves room for them
                 to[*i] = top[*i].clamp(limits[*i].0 + step, limits[*i].1 - step) + times * step;
             }
             let (there, design) = (assumed_at(to, &here.assumed), Arc::clone(&here.design));
@@ -53,7 +54,7 @@ impl Fitted {
         };
         let found = || {
             let first = information(usual.len(), |moves| height(&usual, moves), false)?;
-            // a standard error each
+            // one standard error each
             let error = |(k, (i, step)): (usize, &(usize, f64))| {
                 let errors = if first[(k, k)] > 0.0 { first[(k, k)].sqrt().recip() } else { MOST };
                 within(*i, step * errors.clamp(1.0 / 3.0, MOST))
@@ -66,11 +67,11 @@ impl Fitted {
     }
 }
 
-/// Minus the second derivatives of a `height` of that many numbers, in steps, the mixed ones where they are wanted;
-/// `None` where it is unknown somewhere.
+/// Minus the second derivatives of a `height` in that many parameters, in steps, including mixed ones where they are
+/// needed; `None` where it is undefined somewhere.
 fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync, mixed: bool) -> Option<DMatrix<f64>> {
     let middle = height(&vec![0.0; numbers])?;
-    // the two heights on both sides, along one number or along two together. Of many profiles each has hundreds of
+    // the two heights on both sides, along one parameter or along two together. With many profiles each has hundreds of
     // megabytes of maps: no more than two at a time
     let sum = |i: usize, j: usize| {
         let side = |sign: f64| {
@@ -92,7 +93,8 @@ fn information(numbers: usize, height: impl Fn(&[f64]) -> Option<f64> + Sync, mi
     Some(found)
 }
 
-/// The errors by the second derivatives in steps, for a field at `top`; without those of numbers that are left open.
+/// The uncertainties by the second derivatives in steps, for a field at `top`; without those of unconstrained
+/// parameters.
 fn of(steps: &Steps, information: &DMatrix<f64>, top: &Vector4<f64>) -> FieldErrors {
     let (told, open): (Vec<usize>, Vec<usize>) = (0..steps.len()).partition(|k| information[(*k, *k)] > LEAST);
     let unconstrained = open.iter().map(|k| Parameter::FIELD[steps[*k].0].name().to_owned()).collect();
@@ -106,7 +108,7 @@ fn of(steps: &Steps, information: &DMatrix<f64>, top: &Vector4<f64>) -> FieldErr
         let at = told.iter().position(|k| steps[*k].0 == i)?;
         Some(covariance[(at, at)].sqrt() * steps[told[at]].1)
     };
-    // ln amplitude and ln lifetime are what is told
+    // the derivatives apply to ln amplitude and ln lifetime
     let of_logarithm = |i: usize| Some(sigma(i)? * top[i].exp());
     FieldErrors {
         sigma_spot_amplitude: of_logarithm(0),

@@ -1,10 +1,10 @@
-//! Profiles that all others do not predict: flares, prominences, cosmic rays, the Moon. Their errors become so much
-//! larger that they are predicted (`docs/method.md` section 9).
+//! Profiles that all others do not predict: flares, prominences, cosmic rays, moonlight. Their uncertainties are
+//! increased until they are consistent with the prediction (`docs/method.md` section 9).
 //!
-//! chi2 of a profile given all others is in closed form. A profile that is worse than the usual one by more than chance
-//! allows has its errors multiplied by the square root of the ratio; then the field is fitted anew, for the jitter of
-//! all profiles was theirs, until no profile is left that fails. A jitter is fitted even where the config has one: a
-//! planet moves every profile, and is no event.
+//! chi2 of a profile given all others has a closed form. The uncertainties of a profile that is worse than the usual
+//! one by more than chance allows are multiplied by the square root of the ratio; then the field is fitted again,
+//! because the jitter had absorbed the event, until no profile fails. A jitter is fitted even where the config has one:
+//! a planet moves every profile, and is no event.
 
 use super::fit::fit;
 use super::star::DEGREE;
@@ -16,52 +16,52 @@ use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Fewer profiles do not tell which of them is unusual.
+/// With fewer profiles the outlier cannot be identified.
 const FEWEST: usize = 8;
 
-/// A profile is an event where chance makes one so bad among all of them as rarely as this.
+/// A profile is an event where chance makes one this bad among all of them as rarely as this.
 const RARE: f64 = 1e-3;
 
-/// Rounds of naming and fitting: in each one those are named that are nearly as bad as the worst one.
+/// Iterations of identifying and fitting: each identifies those that are nearly as bad as the worst one.
 const ROUNDS: usize = 10;
 const ALIKE: f64 = 0.6;
 
-/// Errors of an event are large enough where its chi2 is below this, over that of the usual profile.
+/// Uncertainties of an event are large enough where its chi2 is below this, relative to the usual profile.
 const STILL: f64 = 1.2;
 
-/// What a user says of a profile.
+/// A user's statement on a profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ByHand {
-    /// Nothing.
+    /// None.
     #[default]
     Open,
-    /// That it is an event.
+    /// It is an event.
     Event,
-    /// That it is none.
+    /// It is not an event.
     Sound,
 }
 
-/// Errors of an event that a user names are multiplied by this at least.
+/// Smallest factor on the uncertainties of an event that a user names.
 const LEAST_BY_HAND: f64 = 3.0;
 
 /// A profile that all others do not predict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// Which profile, from 1.
+    /// The number of the profile, from 1.
     pub profile: usize,
     /// Its time (d).
     pub time_d: f64,
-    /// Factor on its errors.
+    /// Factor on its uncertainties.
     pub sigma_factor: f64,
-    /// chi2 per datum given all others, with errors as they were, over that of the usual profile; 1 where a user names
-    /// it.
+    /// chi2 per datum given all others, with the original uncertainties, relative to the usual profile; 1 where a user
+    /// names it.
     pub excess: f64,
-    /// Probability that chance alone makes a profile so bad; 1 where a user names it.
+    /// Probability that chance alone makes a profile this bad; 1 where a user names it.
     pub p_value: f64,
 }
 
-/// The profiles that the others do not predict, for a star at `values` with a field like `near`, what is known of them
-/// `by_hand` in their order.
+/// The profiles that the others do not predict, for a star at `values` with a field like `near`, given the user's
+/// statements `by_hand` in their order.
 ///
 /// # Errors
 /// [`NoFit`].
@@ -99,12 +99,12 @@ pub fn events(
         let failing: Vec<usize> = (0..count).filter(fails).collect();
         let worst = failing.iter().map(|k| ratios[*k].0).fold(1.0, f64::max);
         let mut is_settled = failing.is_empty();
-        // as they were named, errors may still be too small
+        // after the first factors, uncertainties may still be too small
         for (event, (ratio, _)) in found.iter_mut().zip(&ratios).filter_map(|(event, of)| Some((event.as_mut()?, of))) {
             is_settled &= *ratio < STILL;
             event.sigma_factor *= ratio.sqrt().max(1.0);
         }
-        // an event makes its neighbours look like some
+        // an event makes its neighbours look like events
         for k in failing.into_iter().filter(|k| ratios[*k].0 - 1.0 > ALIKE * (worst - 1.0)) {
             let (excess, time_d) = (ratios[k].0, times_d[k]);
             let (profile, sigma_factor, p_value) = (k + 1, excess.sqrt(), chance(k));
@@ -117,7 +117,8 @@ pub fn events(
     Ok(found.into_iter().flatten().collect())
 }
 
-/// Of each profile chi2 per datum over that of the median profile of its data set, and its number of independent data.
+/// chi2 per datum of each profile relative to that of the median profile of its data set, and its number of independent
+/// data.
 fn over_usual(imager: &Imager, chi2: &[f64]) -> Vec<(f64, f64)> {
     let data: Vec<f64> = imager.profiles().map(|(_, _, bins)| bins as f64).collect();
     let of_set = |set: std::ops::Range<usize>| {

@@ -1,4 +1,4 @@
-//! ln Z to second order in the velocities of the profiles and in the star's own parameters.
+//! ln Z to second order in the velocities of the profiles and in the stellar parameters.
 
 use super::light::Light;
 use super::{Design, Marginal};
@@ -12,13 +12,14 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 impl Marginal {
-    /// ln Z, the jitter counted, those zero points held that are otherwise integrated out.
+    /// ln Z, the jitter counted, with those RV offsets held that are otherwise marginalised over.
     pub fn ln_evidence(&self) -> f64 {
         self.settled.evidence.ln_evidence()
     }
 
-    /// ln Z around the values, at the most probable maps. As the maps are fixed in the derivatives, the information is
-    /// that of the model linearised there; the covariance of the gradient over data of the model is the same matrix.
+    /// ln Z around the values, at the most probable maps. Because the maps are fixed in the derivatives, the
+    /// information is that of the model linearised there; the covariance of the gradient over data of the model is the
+    /// same matrix.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -26,7 +27,7 @@ impl Marginal {
         self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, stellar)?)
     }
 
-    /// The same, and with those zero points of data sets held that are otherwise integrated out.
+    /// The same, and the same with those RV offsets of data sets held that are otherwise marginalised over.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -36,8 +37,8 @@ impl Marginal {
         Ok([self.with_zero_points_integrated(imager, stellar, quadratic)?, held])
     }
 
-    /// The expansion without each of these groups of profiles (ascending), the maps those of all: what `then` makes of
-    /// the expansion of all others.
+    /// The expansion without each of these groups of profiles (ascending), with the maps of all profiles: the results
+    /// of `then` for the expansion of all others.
     ///
     /// # Errors
     /// [`FieldError`], of all groups or of one.
@@ -61,7 +62,7 @@ impl Marginal {
         Ok(all.into_iter().map(Result::flatten).collect())
     }
 
-    /// chi2 of each profile as all others predict it.
+    /// chi2 of each profile as predicted by all others.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -86,7 +87,7 @@ impl Marginal {
         Ok(self.expanded(imager, stellar, quadratic))
     }
 
-    /// The same, those zero points of data sets held that are otherwise integrated out.
+    /// The same with those RV offsets of data sets held that are otherwise marginalised over.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -94,7 +95,7 @@ impl Marginal {
         Ok(self.expanded(imager, stellar, self.quadratic(imager, stellar)?))
     }
 
-    /// ln Z, the jitter counted and zero points of data sets integrated out.
+    /// ln Z, the jitter counted and marginalised over RV offsets of data sets.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -132,8 +133,8 @@ impl Marginal {
         (epochs.into_iter().map(|epoch| epoch.misfit).collect(), self.slopes_of_epochs(imager, stellar))
     }
 
-    /// How the numbers of each epoch change with a velocity and with the star's parameters, at the most probable maps
-    /// (numbers, 1 + parameters).
+    /// Derivatives of the coefficients of each epoch with a velocity and with the stellar parameters, at the most
+    /// probable maps (coefficients, 1 + parameters).
     pub(super) fn slopes_of_epochs(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
         if stellar.is_empty() {
             return self.velocity_slopes(imager).to_vec();
@@ -144,20 +145,20 @@ impl Marginal {
         slopes
     }
 
-    /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable
-    /// maps (bins, 1 + parameters).
+    /// Derivatives of the depths of each profile with its velocity and with the stellar parameters, at the most
+    /// probable maps (bins, 1 + parameters).
     pub(in crate::surface) fn slopes(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
         self.design.slopes(imager, &self.values, &self.brightness(), stellar)
     }
 }
 
-/// RV offsets of nights are noise of the velocities: they are integrated out of all that is said of these.
+/// RV offsets of nights are noise of the velocities: all results for these are marginalised over them.
 fn with_night_offsets(imager: &Imager, quadratic: Quadratic) -> Result<Quadratic, FieldError> {
     let offsets = imager.night_offsets(quadratic.gradient.len());
     with_integrated(quadratic, &offsets)
 }
 
-/// The quadratic with velocities that profiles have in `common` integrated out.
+/// The quadratic marginalised over velocities that profiles have in `common`.
 pub(super) fn with_integrated(quadratic: Quadratic, common: &[Common]) -> Result<Quadratic, FieldError> {
     if common.is_empty() {
         return Ok(quadratic);
@@ -169,8 +170,8 @@ pub(super) fn with_integrated(quadratic: Quadratic, common: &[Common]) -> Result
 }
 
 impl Design {
-    /// How the depths of each profile change with its velocity and with the star's parameters (bins, 1 + parameters)
-    /// at `values`, for maps of this `brightness` (pixels, profiles).
+    /// Derivatives of the depths of each profile with its velocity and with the stellar parameters (bins, 1 +
+    /// parameters) at `values`, for maps of this `brightness` (pixels, profiles).
     pub(super) fn slopes(
         &self,
         imager: &Imager,
@@ -207,8 +208,8 @@ impl Design {
     }
 }
 
-/// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of the profiles, which
-/// are the first epochs, and the parameters, which are those of all epochs.
+/// From coordinates per epoch, velocity first and then the stellar parameters, to the velocities of the profiles, which
+/// are the first epochs, and the parameters, which all epochs share.
 pub(super) fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar: usize) -> Quadratic {
     if stellar == 0 && epochs == profiles {
         return of_all.clone();

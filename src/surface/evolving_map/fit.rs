@@ -1,5 +1,4 @@
-//! What the profiles say of the field itself: the amplitude, slope and lifetime for which ln Z is largest, and the
-//! jitter.
+//! The fit of the field: the amplitude, slope and lifetime for which ln Z is largest, and the jitter.
 
 use super::climb::{GAIN, STEPS, Top, climb, limits, place};
 use super::known::{Known, USUAL};
@@ -12,19 +11,19 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
+/// Amplitude and slope of a spectrum without a break over those of an equally good one with it.
 const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
 
-/// From so much lower in ln Z no climb makes good.
+/// A climb cannot recover from this deficit in ln Z.
 const FAR_BELOW: f64 = 5.0;
 
 const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 const USUAL_JITTER_KMS: f64 = 0.1;
 
-/// A fit of so many profiles starts from that of a share of them, at most half as many.
+/// A fit of so many profiles starts from that of a subset of them, at most half as many.
 const MANY: usize = 160;
 
-/// Parts of this are spread evenly, and never come again.
+/// Multiples of this are evenly distributed modulo 1, and never repeat.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Beyond so many profiles times squared harmonics a climb of 20 to 40 evaluations takes minutes: 411 profiles of a
@@ -40,7 +39,7 @@ pub struct Fitted {
     pub ln_evidence: f64,
     /// Bounds of the search that were reached.
     pub at_bounds: Vec<&'static str>,
-    /// Roughly minus the second derivatives of ln Z in the coordinates of the search; `None` if there was no search.
+    /// Approximate minus second derivatives of ln Z in the coordinates of the search; `None` if there was no search.
     pub(super) hessian: Option<Matrix4<f64>>,
 }
 
@@ -50,13 +49,13 @@ pub enum NoFit {
     /// The field cannot be marginalised over.
     #[error(transparent)]
     Field(#[from] FieldError),
-    /// The density of the data is no number.
+    /// The density of the data is not finite.
     #[error("the evidence of the most probable field is not finite: check intensities and uncertainties")]
     NotFinite,
 }
 
 impl NoFit {
-    /// A name for it.
+    /// A status for it.
     pub fn status(&self) -> &'static str {
         match self {
             NoFit::Field(FieldError::NoSuchField { .. }) => "no-such-field",
@@ -68,7 +67,7 @@ impl NoFit {
 }
 
 impl Fitted {
-    /// What a fit may start from.
+    /// A start for another fit.
     pub(in crate::surface) fn near(marginal: Marginal) -> Self {
         Fitted { ln_evidence: marginal.ln_evidence(), marginal, at_bounds: Vec::new(), hessian: None }
     }
@@ -80,8 +79,8 @@ impl Fitted {
     }
 }
 
-/// The profiles with a usual field, but for what is known: one that does not change, if the lifetime is not. Maps are
-/// found from those `near` by.
+/// The profiles with a usual field, except for what is known: a static one, unless the lifetime is known. Maps are
+/// found from those `near`.
 pub(in crate::surface) fn usual(
     imager: &Imager,
     basis: &Arc<Basis>,
@@ -96,9 +95,9 @@ pub(in crate::surface) fn usual(
     Ok(Fitted::near(Marginal::new(imager, basis, design, values, assumed, near)?))
 }
 
-/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from where what is `known`
-/// has it begin, or else from several lifetimes; of many profiles from what a share of them says, whether the spectrum
-/// has a break included. Where a climb with all of them takes minutes the field is that of the share.
+/// Fits the field to the profiles at `values`, from the result of a fit `near`, or from the start in what is `known`,
+/// or from several lifetimes; with many profiles from the fit of a subset, including whether the spectrum has a break.
+/// Where a climb with all of them takes minutes the field of the subset is used.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -120,7 +119,7 @@ pub fn fit(
     {
         return Ok(fitted);
     }
-    // the field that a fit begins from has or has no break
+    // the field from which a fit begins has or lacks a break
     let begin = known.begin().filter(|_| near.is_none()).and_then(|begin| at(begin, None).ok());
     let is_near = near.is_some() || begin.is_some();
     let share = if many && !is_near { share_of_many(imager) } else { None };
@@ -133,7 +132,7 @@ pub fn fit(
         }
         (None, None, None) => {
             let rough = Arc::new(basis.roughly());
-            // of many profiles each is hundreds of megabytes: only the best so far is kept
+            // with many profiles each takes hundreds of megabytes: only the best so far is kept
             let higher = |best, next| higher(best, next, &known);
             let start = |of_field: Vec<Assumed>| {
                 of_field.into_iter().fold(None, |best: Option<Found>, assumed| {
@@ -149,7 +148,7 @@ pub fn fit(
             (at(best.assumed, Some(&best))?, None)
         }
     };
-    // from what a share or another fit says it is not far, and rough maps need be good to a few tenths only
+    // a subset or another fit gives a start that is close, and rough maps need an accuracy of a few tenths only
     let is_fitted = share.is_some() || near.map_or(is_near, |near| near.hessian.is_some());
     let few = many && basis.is_rough() && is_fitted;
     let mut top = climb(first, &known, hessian, if few { 1 } else { STEPS }, &at)?;
@@ -163,7 +162,7 @@ pub fn fit(
     fitted(marginal, Some(hessian), &known)
 }
 
-/// The fit that ends with these.
+/// The fit with this result.
 fn fitted(marginal: Marginal, hessian: Option<Matrix4<f64>>, known: &Known) -> Result<Fitted, NoFit> {
     let ln_evidence = marginal.ln_evidence();
     if !ln_evidence.is_finite() {
@@ -178,8 +177,8 @@ pub(super) fn takes_minutes(imager: &Imager, basis: &Basis) -> bool {
     imager.epochs() as f64 * (basis.len() as f64).powi(2) > LONG
 }
 
-/// The profiles with the field of a share of them, or of a fit `near` by where maps of the share are not found: those
-/// that follow each other closely say nearly the same of the field. `None` where neither is there.
+/// The profiles with the field of a subset of them, or of a fit `near` where maps of the subset are not found: profiles
+/// that follow each other closely give nearly the same constraints on the field. `None` where neither is available.
 fn by_a_share(
     imager: &Imager,
     (basis, design): (&Arc<Basis>, &Arc<Design>),
@@ -201,7 +200,7 @@ fn by_a_share(
     fitted(marginal, hessian, &known).map(Some)
 }
 
-/// All profiles with the field of a share of them.
+/// All profiles with the field of a subset of them.
 fn of_share(
     share: &Marginal,
     (imager, basis, design): (&Imager, &Arc<Basis>, &Arc<Design>),
@@ -212,7 +211,7 @@ fn of_share(
     begun.or_else(|_| at(share.assumed, None))
 }
 
-/// The profiles with a field from maps near by, or from uniform ones: maps of another orbit may be too far away.
+/// The profiles with a field from neighbouring maps, or from uniform ones: maps of another orbit may be too far away.
 fn anew(
     assumed: Assumed,
     near: &Marginal,
@@ -221,9 +220,9 @@ fn anew(
     at(assumed, Some(near)).or_else(|_| at(assumed, None))
 }
 
-/// A share of the profiles where there are [`MANY`]: one of so many that follow each other in a data set, at most half
-/// as many as that in all, but one of a set at least. Which one changes: profiles at even times would show a star of
-/// the same period from one side.
+/// A subset of the profiles where there are [`MANY`]: one of each group of profiles that follow each other in a data
+/// set, at most half as many in total, but at least one per set. Its position in the group varies: profiles at even
+/// times would show a star of the same period from one side.
 pub(super) fn share_of_many(imager: &Imager) -> Option<Imager> {
     let profiles = imager.profiles().count();
     let every = profiles.div_ceil(MANY / 2);
@@ -237,12 +236,12 @@ pub(super) fn share_of_many(imager: &Imager) -> Option<Imager> {
     (is_many(imager) && kept.len() < MANY).then(|| imager.without(&others()))
 }
 
-/// Whether there are so many profiles that a share tells their field.
+/// Whether there are so many profiles that a subset constrains their field.
 fn is_many(imager: &Imager) -> bool {
     imager.profiles().count() >= MANY
 }
 
-/// Every n-th profile, so that there are so many at most; `None` where there are no more.
+/// Every n-th profile, so that there are at most so many; `None` where there are no more.
 pub(super) fn share_of(imager: &Imager, most: usize) -> Option<Imager> {
     let profiles = imager.profiles().count();
     let every = profiles.div_ceil(most);
@@ -250,7 +249,7 @@ pub(super) fn share_of(imager: &Imager, most: usize) -> Option<Imager> {
     (every > 1).then(|| imager.without(&others()))
 }
 
-/// Where a fit may start: several lifetimes, each with and without a jitter, as far as they are not known.
+/// Starts of a fit: several lifetimes, each with and without a jitter, unless they are known.
 fn starts(known: &Known) -> Vec<Vec<Assumed>> {
     let lifetimes: Vec<Lifetime> = match known.lifetime {
         Some(lifetime) => vec![lifetime],
@@ -270,7 +269,7 @@ fn starts(known: &Known) -> Vec<Vec<Assumed>> {
     lifetimes.iter().map(assumed).collect()
 }
 
-/// The profiles with one of the fields that a fit may start from.
+/// The profiles with one of the starts of a fit.
 type Found = Result<Marginal, FieldError>;
 
 /// The one with the higher ln Z, the first of equals; or the last error.
@@ -282,7 +281,7 @@ fn higher(best: Option<Found>, next: Found, known: &Known) -> Found {
     }
 }
 
-/// The fit with a spectrum that is a power law all the way in place of one with a break, where that is better.
+/// The fit with a pure power-law spectrum instead of one with a break, where that is better.
 fn with_or_without_break(
     fitted: Top,
     known: &Known,
@@ -305,7 +304,7 @@ fn with_or_without_break(
     }
 }
 
-/// The fit with a jitter in place of one without, or the other way round, where that is better.
+/// The fit with a jitter instead of one without, or the other way round, where that is better.
 fn with_or_without_jitter(
     fitted: Top,
     known: &Known,
@@ -314,7 +313,7 @@ fn with_or_without_jitter(
     let assumed = fitted.marginal.assumed;
     let jitter_kms = if assumed.jitter_kms == 0.0 { USUAL_JITTER_KMS / 2.0 } else { 0.0 };
     let Ok(other) = at(Assumed { jitter_kms, ..assumed }, Some(&fitted.marginal)) else { return Ok(fitted) };
-    // without one it is simpler
+    // the model without one is simpler
     let needed = if jitter_kms == 0.0 { -GAIN } else { GAIN };
     if known.height(&other) < known.height(&fitted.marginal) + needed {
         return Ok(fitted);
@@ -322,7 +321,7 @@ fn with_or_without_jitter(
     climb(other, known, None, STEPS, at)
 }
 
-/// Which of the fitted numbers lie on a bound.
+/// The fitted parameters that lie on a bound.
 fn reached(assumed: &Assumed, known: &Known) -> Vec<&'static str> {
     let (place, free, limits) = (place(assumed), known.free(assumed), limits(known));
     let on = |i: &usize| free[*i] && (place[*i] <= limits[*i].0 + 1e-9 || place[*i] >= limits[*i].1 - 1e-9);

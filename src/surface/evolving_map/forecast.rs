@@ -1,9 +1,9 @@
-//! ln Z to second order around a reference in all that is free: velocities, the star's own parameters, and the field
+//! ln Z to second order around a reference in all free parameters: velocities, stellar parameters, and the field
 //! (`docs/method.md` section 9).
 //!
-//! Second derivatives in velocities and star are those of the model linearised at the most probable maps. Those maps
-//! follow the field, and the determinant follows them: what concerns the field, and the slopes and second derivatives
-//! along each of the star's parameters, are differences of ln Z with its maps found anew. Where spots change these are
+//! Second derivatives in velocities and stellar parameters are those of the model linearised at the most probable maps.
+//! Those maps follow the field, and the determinant follows them: derivatives of the field, and the slopes and second
+//! derivatives along each stellar parameter, are differences of ln Z with recomputed maps. Where spots evolve these are
 //! smaller than those of the linearised model, along rotation and shear by factors of 1.4 to 30.
 
 use super::{Marginal, MarginalPosterior};
@@ -15,20 +15,20 @@ use crate::surface::expansion::{Expansion, STELLAR, stellar_step};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-/// Step of the field's parameters, in the coordinates that samplers move in.
+/// Step of the field's parameters, in the sampling coordinates.
 const FIELD_STEP: f64 = 0.15;
 
-/// Step of a parameter of the star, in standard errors of it alone.
+/// Step of a stellar parameter, in its conditional standard errors.
 const STAR_STEP: f64 = 0.7;
 
-/// Second derivatives of ln Z along a parameter of the star over those of the linearised model: within these.
+/// Second derivatives of ln Z along a stellar parameter over those of the linearised model: at least this.
 const LEAST_BEND: f64 = 0.03;
 const MOST_BEND: f64 = 4.0;
 
-/// A parameter of the field that the profiles leave open is known to this many standard deviations of its prior.
+/// Standard deviation of an unconstrained parameter of the field, in standard deviations of its prior.
 const OPEN: f64 = 0.5;
 
-/// ln Z at a displaced place, with its slopes in the velocities and the star's parameters if they were asked for.
+/// ln Z at a displaced point, with its slopes in the velocities and the stellar parameters if they were requested.
 struct Displaced {
     ln_evidence: f64,
     slopes: Option<DVector<f64>>,
@@ -38,7 +38,7 @@ impl MarginalPosterior {
     /// ln Z around the reference, to second order. Coordinates: velocities, then the free parameters of star and field.
     ///
     /// # Errors
-    /// [`FieldError`], where ln Z cannot be had beside the reference.
+    /// [`FieldError`], where ln Z cannot be evaluated near the reference.
     pub fn expansion(&self) -> Result<&Expansion, FieldError> {
         once::found(&self.expansion, || self.expand()).as_ref().map_err(|error| *error)
     }
@@ -94,7 +94,7 @@ impl MarginalPosterior {
         for (s, ([above, below], h)) in ends.iter().zip(&star_steps).enumerate() {
             let at = profiles + s;
             gradient[at] = (above - below) / (2.0 * h);
-            // what ln Z itself has along the parameter, its correlations as they are
+            // the curvature of ln Z along the parameter, with unchanged correlations
             let bend = (2.0 * own.log_likelihood - above - below) / h.powi(2);
             let linear = information[(at, at)];
             if linear > 0.0 {
@@ -110,7 +110,7 @@ impl MarginalPosterior {
         Ok(Expansion { stellar: all, centre, gradient, noise: information.clone(), information, ..own })
     }
 
-    /// Steps of the star's parameters.
+    /// Steps of the stellar parameters.
     fn star_steps(&self, own: &Expansion, star: &[Parameter]) -> Vec<f64> {
         let time_base_d = self.imager.time_base_cycles() * self.imager.star.rotation_period_d;
         let step = |(s, p): (usize, &Parameter)| {
@@ -121,7 +121,7 @@ impl MarginalPosterior {
         star.iter().enumerate().map(step).collect()
     }
 
-    /// ln Z with some parameters displaced in the coordinates that samplers move in.
+    /// ln Z with some parameters displaced in the sampling coordinates.
     fn displaced(&self, moves: &[(Parameter, f64)], slopes: Option<&[Parameter]>) -> Result<Displaced, FieldError> {
         let mut values = self.reference.values;
         for (p, h) in moves {
@@ -141,7 +141,7 @@ impl MarginalPosterior {
         }
     }
 
-    /// Where the profiles leave a parameter of the field open its prior stands in, by itself.
+    /// Replaces an unconstrained parameter of the field by its prior, independent of all else.
     fn close(&self, parameter: Parameter, at: usize, information: &mut nalgebra::DMatrix<f64>) {
         let (low, high) = parameter.widest();
         let width = parameter.to_sampling(high) - parameter.to_sampling(low);
@@ -154,7 +154,7 @@ impl MarginalPosterior {
     }
 }
 
-/// The posterior as an expansion of ln L has it: what searches climb at no cost.
+/// The posterior from an expansion of ln L: searches climb it at no cost.
 #[derive(Clone, Debug)]
 pub struct Forecast<'a> {
     /// The parameters and their priors.
@@ -163,7 +163,7 @@ pub struct Forecast<'a> {
     pub expansion: &'a Expansion,
 }
 
-/// Numerical derivatives step by this share of a coordinate's natural scale.
+/// Steps of numerical derivatives, as a fraction of a coordinate's natural scale.
 const DERIVATIVE_STEP: f64 = 0.01;
 
 impl LogDensity for Forecast<'_> {

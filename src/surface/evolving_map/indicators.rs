@@ -1,14 +1,14 @@
-//! What an activity indicator has to do with the spots: its gain by the evidence, and rows of the field's likelihood
+//! The dependence of an activity indicator on the spots: its gain by the evidence, and rows of the field's likelihood
 //! (`docs/method.md` section 9).
 //!
 //! A reading is `level + slope t + gain f(t) + noise`, with f the filling factor of the visible disc, weighted by
-//! projected area and limb darkening, and noise of its own errors and a jitter. Profiles predict f(t) with a
+//! projected area and limb darkening, and noise from its uncertainties and a jitter. Profiles predict f(t) with a
 //! covariance, so that the likelihood of all readings is a Gaussian for each gain and jitter. The gain has a Gaussian
-//! prior around 0 that lets spots of the field make all of the variation; where it gains too little over no gain it
-//! is 0, and the indicator is left out.
+//! prior around 0 with a width for which spots of the field explain all of the variation; where it improves ln Z too
+//! little it is set to 0, and the indicator is omitted.
 //!
-//! Left out: the uncertainty of gain and jitter, which are held where they are most probable; delays of an indicator
-//! behind the spots.
+//! Not included: the uncertainty of gain and jitter, which are held at their most probable values; time lags of an
+//! indicator behind the spots.
 
 use super::{Basis, Marginal};
 use crate::field::Epoch;
@@ -20,48 +20,48 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// An indicator counts where its gain raises ln Z by more than this: odds of 20 to 1.
+/// An indicator is used where its gain raises ln Z by more than this: odds of 20 to 1.
 pub const NEEDED: f64 = 3.0;
 
 /// Standard deviation of the priors of level and slope, the latter from the middle to the end, over the rms of the
 /// values.
 const LEVEL: f64 = 3.0;
 
-/// Largest gain that is looked at, over that of which the spots of the field make all variation; and steps of the first
-/// look.
+/// Largest gain that is tried, relative to that for which the spots of the field explain all variation; and steps of
+/// the first scan.
 const LARGEST: f64 = 4.0;
 const STEPS: i32 = 40;
 
-/// Smallest error of a gain that is looked for, over the same.
+/// Smallest uncertainty of a gain in the search, in the same units.
 const SMALLEST: f64 = 1e-5;
 
 /// Jitters that are tried, over the rms of the values.
 const JITTERS: [f64; 12] = [0.0, 0.03, 0.06, 0.1, 0.15, 0.22, 0.3, 0.42, 0.6, 0.8, 1.0, 1.4];
 
-/// What was found of an indicator.
+/// Results for an indicator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FittedIndicator {
     /// Its name.
     pub name: String,
     /// Number of its values.
     pub values: usize,
-    /// Change of the value by a filling factor of the visible disc of 1; 0 where it has nothing to do with the spots.
+    /// Change of the value for a filling factor of the visible disc of 1; 0 where it does not depend on the spots.
     pub gain: f64,
-    /// Its standard deviation; that of the gain that was looked for where it is 0.
+    /// Its standard deviation; that of the tested gain where it is 0.
     pub sigma_gain: f64,
-    /// Standard deviation of what neither spots nor errors explain, in units of the value.
+    /// Standard deviation that neither spots nor uncertainties explain, in units of the value.
     pub jitter: f64,
     /// ln Bayes factor of the gain over none.
     pub ln_bayes: f64,
 }
 
 impl FittedIndicator {
-    /// Whether it counts.
+    /// Whether it is used.
     pub fn is_used(&self) -> bool {
         self.gain != 0.0
     }
 
-    /// It in words.
+    /// A text.
     pub fn line(&self) -> String {
         let FittedIndicator { name, values, gain, sigma_gain, jitter, ln_bayes } = self;
         if !self.is_used() {
@@ -86,7 +86,7 @@ fn rows(imager: &Imager, basis: &Basis, state: &StarState, readings: &[Reading])
     shares.transpose() * &basis.on_pixels
 }
 
-/// Of all indicators that count, one after the other (readings, H): change of their scaled values.
+/// For all indicators in use, one after the other (readings, H): change of their scaled values.
 pub(super) fn jacobian(imager: &Imager, basis: &Basis, state: &StarState) -> DMatrix<f64> {
     let of = |indicator: &Indicator| rows(imager, basis, state, &indicator.readings) * indicator.gain;
     let all: Vec<DMatrix<f64>> = imager.indicators.iter().map(of).collect();
@@ -99,8 +99,8 @@ pub(super) fn jacobian(imager: &Imager, basis: &Basis, state: &StarState) -> DMa
     jacobian
 }
 
-/// The readings of all indicators as epochs, given what each harmonic makes of them, and what maps do: level and slope
-/// follow `before` numbers that others have in common.
+/// The readings of all indicators as epochs, given the effect of each harmonic, and that of the maps: level and slope
+/// follow `before` other common columns.
 pub(super) fn epochs(imager: &Imager, jacobian: &DMatrix<f64>, seen: &[f64], before: usize) -> Vec<Epoch> {
     let numbers = before + 2 * imager.indicators.len();
     let each = imager.indicators.iter().enumerate();
@@ -115,7 +115,7 @@ pub(super) fn epochs(imager: &Imager, jacobian: &DMatrix<f64>, seen: &[f64], bef
     readings.enumerate().map(epoch).collect()
 }
 
-/// What the profiles predict of an indicator, and its values, scaled.
+/// The prediction of the profiles for an indicator, and its values, scaled.
 struct Predicted<'a> {
     readings: &'a [Reading],
     /// Filling factor of the visible disc over its rms by the field: mean and covariance.
@@ -124,7 +124,7 @@ struct Predicted<'a> {
 }
 
 impl Predicted<'_> {
-    /// ln density of the values with a gain and a jitter; minus infinity for what cannot be.
+    /// ln density of the values with a gain and a jitter; minus infinity where it is undefined.
     fn ln_density(&self, gain: f64, jitter: f64) -> f64 {
         let n = self.readings.len();
         let mut covariance = &self.covariance * (gain * gain);
@@ -140,7 +140,7 @@ impl Predicted<'_> {
         -0.5 * (misfit.dot(&factor.solve(&misfit)) + ln_determinant)
     }
 
-    /// With the best jitter, and that.
+    /// The same with the best jitter, and that jitter.
     fn best_jitter(&self, gain: f64) -> (f64, f64) {
         let tried = JITTERS.map(|jitter| (self.ln_density(gain, jitter), jitter));
         tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NEG_INFINITY, 0.0))
@@ -152,7 +152,7 @@ impl Predicted<'_> {
     }
 }
 
-/// Gain and jitter of an indicator with these readings, which are scaled by `scale`, given the profiles alone.
+/// Gain and jitter of an indicator with these readings, scaled by `scale`, given the profiles alone.
 pub fn fit_indicator(
     imager: &Imager,
     marginal: &Marginal,
@@ -174,7 +174,7 @@ pub fn fit_indicator(
     let coarse: Vec<(f64, f64, f64)> = tried.collect::<Vec<_>>().into_par_iter().map(of).collect();
     let best = coarse.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied().unwrap_or((0.0, 0.0, 0.0));
     let (mean, sd, ln_integral, jitter) = integrated(&predicted, best);
-    // of values beyond double precision nothing is known
+    // values beyond double precision give no result
     let found = [mean, sd, ln_integral - without];
     let [mean, sd, ln_bayes] = if found.iter().all(|x| x.is_finite()) { found } else { [0.0; 3] };
     let unit = scale.rms / rms;
@@ -189,11 +189,11 @@ pub fn fit_indicator(
     }
 }
 
-/// Mean and standard deviation of the gain around the best that was tried, ln of the integral over it, and the jitter
+/// Mean and standard deviation of the gain around the best trial value, ln of the integral over it, and the jitter
 /// there.
 fn integrated(predicted: &Predicted, (_, mut gain, mut jitter): (f64, f64, f64)) -> (f64, f64, f64, f64) {
     let mut width = LARGEST / f64::from(STEPS);
-    // to the top, by thirds
+    // to the maximum, by thirds
     for _ in 0..3 {
         let (mut low, mut high) = (gain - width, gain + width);
         for _ in 0..24 {
@@ -207,7 +207,7 @@ fn integrated(predicted: &Predicted, (_, mut gain, mut jitter): (f64, f64, f64))
         jitter = predicted.best_jitter(gain).1;
     }
     let top = predicted.height(gain, jitter);
-    // where it is lower by a half
+    // where it is lower by 1/2
     let drop = |width: f64| top - predicted.height(gain + width, jitter).max(predicted.height(gain - width, jitter));
     while width < LARGEST && drop(width) < 0.5 {
         width *= 1.4;

@@ -1,4 +1,4 @@
-//! What is known of the field before the data are asked, and the bounds of what is not.
+//! Prior knowledge of the field, and the bounds of its free parameters.
 
 use super::{Assumed, Marginal};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
@@ -10,18 +10,18 @@ use serde::{Deserialize, Serialize};
 pub(super) const BOUNDS: [(f64, f64); 3] =
     [Parameter::FIELD[0].widest(), Parameter::FIELD[1].widest(), Parameter::FIELD[2].widest()];
 
-/// Where searches start: usual ones.
+/// Usual starts of searches.
 pub(super) const USUAL: [f64; 3] =
     [Parameter::FIELD[0].usual(), Parameter::FIELD[1].usual(), Parameter::FIELD[2].usual()];
 
 /// An amplitude has a half-normal prior of this standard deviation, unless a config gives another one: no star is
-/// covered so much, and spots that seem to be stand in for something else.
+/// covered so much, and apparent spots beyond it mimic other effects.
 pub const LARGEST_AMPLITUDE: f64 = 1.0;
 
-/// Degree below which the spectrum of spots is flat: those of 10 to 25 deg, here and there.
+/// Degree below which the spectrum of spots is flat: spots of 10 to 25 deg.
 const BREAK_DEGREE: f64 = 7.0;
 
-/// What is known of the field beforehand; what is `None` is fitted.
+/// Prior knowledge of the field; parameters that are `None` are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Known {
     /// Standard deviation of the filling factor.
@@ -38,10 +38,10 @@ pub struct Known {
     /// Scale of the half-Cauchy prior of the jitter (km/s), where it is fitted: the stability of the spectrograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jitter_scale_kms: Option<f64>,
-    /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
-    /// in ln amplitude, up to usual ones, slope and ln lifetime.
+    /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are uniform between the
+    /// bounds in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
-    /// Where a fit begins: at a field that was found with coarser maps, instead of several.
+    /// Start of a fit: a field that was found with coarser maps, instead of several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<FieldStart>,
 }
@@ -74,7 +74,7 @@ impl From<Assumed> for FieldStart {
 }
 
 impl Known {
-    /// All as it was fitted.
+    /// All values as fitted.
     pub fn of(marginal: &Marginal) -> Self {
         let Assumed { field, jitter_kms } = marginal.assumed;
         Known {
@@ -89,7 +89,7 @@ impl Known {
         }
     }
 
-    /// Where a fit begins, if not at several fields, what is known as it is.
+    /// The start of a fit, unless there are several, with the known values.
     pub(super) fn begin(&self) -> Option<Assumed> {
         let start = self.start?;
         let spectrum = Spectrum {
@@ -105,13 +105,13 @@ impl Known {
         Some(Assumed { field, jitter_kms: self.jitter_kms.unwrap_or(start.velocity_jitter_kms) })
     }
 
-    /// Degree below which the spectrum is flat where a search starts: a slope that is given is that of a power law all
-    /// the way, unless a break is given, too.
+    /// Degree below which the spectrum is flat at the start of a search: a given slope means a pure power law, unless a
+    /// break is given, too.
     pub fn break_degree(&self) -> f64 {
         self.break_degree.unwrap_or(if self.slope.is_some() { 0.0 } else { BREAK_DEGREE })
     }
 
-    /// The spectrum where a search starts.
+    /// The spectrum at the start of a search.
     pub(super) fn spectrum(&self) -> Spectrum {
         let usual = |i: usize| self.within(i, USUAL[i]);
         Spectrum {
@@ -152,17 +152,17 @@ impl Known {
         (0..3).filter_map(of).sum::<f64>() + usual + jitter
     }
 
-    /// What is maximised: ln Z, and what is known of the field beforehand.
+    /// The objective: ln Z, and the prior of the field.
     pub(super) fn height(&self, of: &Marginal) -> f64 {
         of.ln_evidence() + self.log_prior(&of.assumed)
     }
 
-    /// The same of a star that does not change.
+    /// The same for a static map.
     pub fn unchanging(self) -> Self {
         Known { lifetime: Some(Lifetime::Static), ..self }
     }
 
-    /// Whether anything is left to fit.
+    /// Whether any parameter is fitted.
     pub(super) fn is_open(&self) -> bool {
         let open = [self.amplitude.is_none(), self.slope.is_none(), self.lifetime.is_none(), self.jitter_kms.is_none()];
         open.contains(&true)

@@ -1,9 +1,9 @@
-//! Light curves in the marginal likelihood: each bin is an epoch with one number and no velocity
-//! (`docs/method.md` section 9).
+//! Light curves in the marginal likelihood: each bin is an epoch with one datum and no velocity (`docs/method.md`
+//! section 9).
 //!
-//! The flux of a map over that of a star of mean filling factor is linear in the map, `1 + J c`. What is measured is
-//! that times a level and a slope of the segment, to first order `1 + J c + level + slope place`: two numbers that all
-//! bins of a segment have in common, integrated out.
+//! The flux of a map relative to a star of mean filling factor is linear in the map, `1 + J c`. It is measured times a
+//! level and a slope of the segment, to first order `1 + J c + level + slope place`: two parameters common to all bins
+//! of a segment, marginalised over.
 
 use super::indicators;
 use super::{Basis, MEAN_FILLING, Marginal};
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Standard deviation of the prior of a segment's level, and of the change from its middle to its end by its slope, in
-/// units of its mean flux: what spots that no profile knows of may take away, and instruments drift by.
+/// units of its mean flux: for spots to which no profile is sensitive, and instrumental drifts.
 pub const LEVEL: f64 = 0.1;
 
 /// Light curves of each harmonic, for one star.
@@ -32,18 +32,18 @@ pub(super) struct Light {
     of_indicators: DMatrix<f64>,
 }
 
-/// A bin of a light curve and what the most probable maps make of it.
+/// A bin of a light curve and its model by the most probable maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxFit {
     /// Number of the light curve, from 0.
     pub curve: usize,
     /// The bin.
     pub bin: FluxBin,
-    /// Flux of the most probable map, level and slope of the segment included.
+    /// Flux of the most probable map, including level and slope of the segment.
     pub model: f64,
 }
 
-/// A reading of an indicator and what the most probable maps make of it, in units of the indicator.
+/// A reading of an indicator and its model by the most probable maps, in units of the indicator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadingFit {
     /// Number of the indicator among all that were given, from 0.
@@ -52,15 +52,15 @@ pub struct ReadingFit {
     pub time_d: f64,
     /// The value.
     pub value: f64,
-    /// Its standard error, jitter included.
+    /// Its standard error, including jitter.
     pub sigma: f64,
-    /// The value by the most probable map, level and slope included.
+    /// The value by the most probable map, including level and slope.
     pub model: f64,
 }
 
 impl Light {
-    /// Of the star in `imager` at `state`. Within a bin the star turns: the mean of two times that are a standard
-    /// deviation before and after its middle is good to the third order in the width.
+    /// The light curves of the star in `imager` at `state`. The star rotates within a bin: the mean of two times that
+    /// are a standard deviation before and after its middle is accurate to the third order in the width.
     pub fn new(imager: &Imager, basis: &Basis, state: &StarState) -> Self {
         let bins: Vec<(&LightCurve, &FluxBin)> =
             imager.light_curves.iter().flat_map(|curve| curve.bins.iter().map(move |bin| (curve, bin))).collect();
@@ -68,7 +68,7 @@ impl Light {
             let times_d = [bin.time_d - bin.spread_d, bin.time_d + bin.spread_d];
             let mut shares = curve.band.shares(&imager.grid, &imager.star, state, &times_d);
             let q = 1.0 - curve.band.contrast(&imager.star, state);
-            // darker towards the limb, the sum is more than 1
+            // with limb darkening the sum exceeds 1
             let scale = -q / (1.0 - q * MEAN_FILLING * shares.iter().sum::<f64>());
             shares.iter_mut().for_each(|share| *share *= scale);
             shares
@@ -117,7 +117,7 @@ impl Light {
         epochs
     }
 
-    /// How the flux of each bin, and each reading, changes with a velocity, which is not at all, and with the star's
+    /// Derivatives of the flux of each bin, and of each reading, with a velocity, which are zero, and with the stellar
     /// parameters at `values`, for maps of these coefficients (H, bins and readings): (1, 1 + parameters) each.
     pub fn slopes(
         (imager, basis): (&Imager, &Basis),
@@ -142,7 +142,7 @@ impl Light {
         slopes
     }
 
-    /// Flux of each bin, and then what spots do to each reading, before level and slope.
+    /// Flux of each bin, and then the effect of spots on each reading, before level and slope.
     fn fluxes(&self, maps: DMatrixView<f64>) -> DVector<f64> {
         let bins = self.jacobian.nrows();
         let seen = |rows: &DMatrix<f64>, k: usize, map: usize| rows.row(k).transpose().dot(&maps.column(map));
@@ -153,16 +153,16 @@ impl Light {
     }
 }
 
-/// A bin so many standard deviations from the maps is no noise,
+/// A bin so many standard deviations from the maps is not noise,
 const BEYOND_NOISE: f64 = 5.0;
 
 /// and neither is a light curve of a larger chi2 per bin.
 const WORST_CHI2: f64 = 2.0;
 
-/// As many bins are named.
+/// Largest number of bins that are listed.
 const NAMED: usize = 5;
 
-/// What of light curves is not as noise would have it: chi2 per bin, and single bins.
+/// Deviations of light curves from noise: chi2 per bin, and single bins.
 pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
     let mut all = Vec::new();
     for (c, curve) in imager.light_curves.iter().enumerate() {
@@ -171,7 +171,7 @@ pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
             fits.iter().filter(|fit| fit.curve == c).map(|fit| (fit.bin.time_d, scaled(fit))).collect();
         let chi2 = of_curve.iter().map(|(_, off)| off * off).sum::<f64>() / of_curve.len() as f64;
         let name = &curve.name;
-        // a few wild bins do not hide each other
+        // a few outliers do not hide each other
         let scatter = (1.4826 * middle(of_curve.iter().map(|(_, off)| off.abs()).collect())).max(1.0);
         let wild: Vec<&(f64, f64)> = of_curve.iter().filter(|(_, off)| off.abs() > BEYOND_NOISE * scatter).collect();
         if !wild.is_empty() {
@@ -197,8 +197,8 @@ pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
 }
 
 impl Marginal {
-    /// What the most probable maps leave of each bin of the light curves and of each reading of the indicators, level
-    /// and slope of each segment and indicator where they are most probable given these maps.
+    /// Residuals of the most probable maps in each bin of the light curves and each reading of the indicators, with the
+    /// most probable level and slope of each segment and indicator given these maps.
     fn beside_profiles(&self, imager: &Imager) -> Vec<f64> {
         let epochs = self.design.epochs(imager, &self.settled.coefficients);
         let of_light = &epochs[self.design.response().profiles()..];
@@ -208,12 +208,12 @@ impl Marginal {
             inner += common.tr_mul(common) / variance[0];
             along += common.tr_mul(misfit) / variance[0];
         }
-        // a sum of squares and 1 is positive definite
+        // a sum of squares plus 1 is positive definite
         let levels = inner.cholesky().map_or(DVector::zeros(numbers), |factor| factor.solve(&along));
         of_light.iter().map(|epoch| epoch.misfit[0] - (&epoch.common * &levels)[0]).collect()
     }
 
-    /// The light curves as the most probable maps explain them.
+    /// The light curves with the model of the most probable maps.
     pub fn light_curves(&self, imager: &Imager) -> Vec<FluxFit> {
         let curves = imager.light_curves.iter().enumerate();
         let bins = curves.flat_map(|(c, curve)| curve.bins.iter().map(move |bin| (c, *bin)));
@@ -222,7 +222,7 @@ impl Marginal {
         bins.zip(self.beside_profiles(imager)).map(fit).collect()
     }
 
-    /// The readings of the indicators that count as the most probable maps explain them.
+    /// The readings of the indicators in use with the model of the most probable maps.
     pub fn readings(&self, imager: &Imager) -> Vec<ReadingFit> {
         let bins = imager.light_curves.iter().map(|curve| curve.bins.len()).sum();
         let all = imager.indicators.iter().flat_map(|one| one.readings.iter().map(move |reading| (one, reading)));

@@ -1,4 +1,4 @@
-//! The star of a fit as every surface model gives it: linearised, with its spots as a field.
+//! The star of a fit in the form of all surface models: linearised, with its spots as a field.
 
 use super::{Assumed, Fitted};
 use crate::field::{Field, FieldError};
@@ -30,7 +30,7 @@ pub(in crate::surface) fn linearised(
 }
 
 impl SpotField {
-    /// Of a fit.
+    /// The field of a fit.
     pub(crate) fn of(fitted: &Fitted) -> Self {
         let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
         SpotField {

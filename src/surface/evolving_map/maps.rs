@@ -1,4 +1,4 @@
-//! The most probable maps of a fitted field at any times, with their errors (`docs/method.md` section 9).
+//! The most probable maps of a fitted field at any times, with their uncertainties (`docs/method.md` section 9).
 
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, approach, settle};
@@ -11,9 +11,9 @@ use std::sync::Arc;
 /// Maps at some times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maps {
-    /// Most probable spot filling factor (pixels, times). Below 0 it is brighter than the photosphere.
+    /// Most probable spot filling factor (pixels, times). Below 0 the surface is brighter than the photosphere.
     pub filling: DMatrix<f64>,
-    /// Its standard deviation (pixels, times), what is assumed of the field held.
+    /// Its standard deviation (pixels, times), with the field's parameters held.
     pub sd: DMatrix<f64>,
 }
 
@@ -22,7 +22,7 @@ impl Maps {
     pub fn at(settled: &Settled, basis: &Basis, times_d: &[f64]) -> Self {
         let filling = basis.filling(&settled.evidence.coefficients_at(times_d));
         let mut sd = settled.evidence.standard_deviations(&basis.on_pixels.transpose(), times_d);
-        // what no data see is as it was before them
+        // directions to which no data are sensitive keep their prior
         let unseen = basis.unseen_variances(&settled.evidence.field().spectrum);
         for mut map in sd.column_iter_mut() {
             map.zip_apply(&unseen, |sd, unseen| *sd = sd.hypot(unseen.sqrt()));
@@ -32,7 +32,7 @@ impl Maps {
 }
 
 impl Marginal {
-    /// The same maps, the jitter no noise of the profiles.
+    /// The same maps, without the jitter as noise of the profiles.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -46,10 +46,10 @@ impl Marginal {
         Ok(Marginal { assumed: Assumed { jitter_kms: 0.0, ..self.assumed }, settled, ..self.clone() })
     }
 
-    /// At `values`, by a star `nearby` from maps of these coefficients (H, epochs), where the jitter is noise of the
-    /// profiles, along their slopes at the most probable maps. Maps that know nothing of it explain zero points by
-    /// spots, so slopes and maps are found in turn, so many times: slopes of other maps than these would seem to tell
-    /// the velocities of the profiles from their zero points.
+    /// Maps at `values`, for a star `nearby` with maps of these coefficients (H, epochs), with the jitter as noise of
+    /// the profiles along their slopes at the most probable maps. Maps without it explain the jitter by spots, so
+    /// slopes and maps are found in turn, so many times: with the slopes of other maps the velocities of the profiles
+    /// would seem distinguishable from the jitter.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -68,7 +68,7 @@ impl Marginal {
         };
         let mut last: Option<Evidence> = None;
         for _ in 1..times {
-            // no evidence, as slopes are found anew
+            // no evidence, as slopes are recomputed
             let linearise = |maps: &DMatrix<f64>| design.jittered(imager, maps, &slopes, assumed.jitter_kms);
             let by = Some(last.as_ref().unwrap_or(&nearby.settled.evidence));
             let way = approach(linearise, sought, coefficients, by, &basis.settling)?;
@@ -82,7 +82,7 @@ impl Marginal {
         Ok(Marginal::settled_at((basis, design), values, assumed, settled))
     }
 
-    /// How the numbers of each epoch change with a velocity, at the most probable maps (numbers, 1).
+    /// Derivatives of the coefficients of each epoch with a velocity, at the most probable maps (coefficients, 1).
     pub(super) fn velocity_slopes(&self, imager: &Imager) -> &[DMatrix<f64>] {
         let found = || self.design.velocity_slopes((imager, &self.basis), &self.values, &self.settled.coefficients);
         once::found(&self.velocity_slopes, found).as_slice()
@@ -90,7 +90,7 @@ impl Marginal {
 }
 
 impl Design {
-    /// The same at `values`, for maps of these coefficients (H, epochs). Light curves know of no velocity.
+    /// The same at `values`, for maps of these coefficients (H, epochs). Light curves do not depend on velocity.
     fn velocity_slopes(
         &self,
         (imager, basis): (&Imager, &Basis),
@@ -105,7 +105,7 @@ impl Design {
         slopes
     }
 
-    /// The epochs around maps of these coefficients (H, epochs), a jitter along these slopes among their noise.
+    /// The epochs around maps of these coefficients (H, epochs), with a jitter along these slopes in their noise.
     fn jittered(&self, imager: &Imager, maps: &DMatrix<f64>, slopes: &[DMatrix<f64>], jitter_kms: f64) -> Vec<Epoch> {
         let shares = imager.jitter_share_of_each().into_iter().chain(std::iter::repeat(1.0));
         let jittered = |((epoch, slopes), share): ((Epoch, &DMatrix<f64>), f64)| {

@@ -1,21 +1,21 @@
-//! The marginal likelihood: spots as a Gaussian field on the sphere and in time (room `field`), integrated out of the
-//! profiles (`docs/method.md` section 9).
+//! The marginal likelihood: spots as a Gaussian field on the sphere and in time (room `field`), marginalised over
+//! (`docs/method.md` section 9).
 //!
-//! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
-//! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
-//! parameters, as an expansion like that of maximum entropy. The order:
-//! 1. [`Basis`]: the harmonics on the pixels of the map, once; `seen`: those that the data see.
-//! 2. [`Design`]: the profiles of each harmonic, for one star, a model application a harmonic; and its light curves.
-//!    Both are epochs of the field, profiles first.
-//! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
+//! In: the [`Imager`], values of all parameters, the assumptions on the field ([`Assumed`]). Out: ln Z, and its
+//! gradient and information in the velocities of the profiles and in the stellar parameters, as an expansion like that
+//! of maximum entropy. The order:
+//! 1. [`Basis`]: the harmonics on the pixels of the map, once; `seen`: those to which the data are sensitive.
+//! 2. [`Design`]: the profiles of each harmonic, for one star, by one model application per harmonic; and its light
+//!    curves. Both are epochs of the field, profiles first.
+//! 3. [`Marginal`]: the most probable maps, one per profile, and ln Z linearised there.
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
-//! 5. [`Maps`]: the most probable maps at any times, with their errors.
-//! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
-//! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
-//! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
-//! 9. [`fit_indicator`]: what activity indicators have to do with the spots; those that have are epochs, too.
+//! 5. [`Maps`]: the most probable maps at any times, with their uncertainties.
+//! 6. [`change`]: whether evolving spots explain the profiles better than static ones.
+//! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, likelihood grids and searches.
+//! 8. [`Planned`]: the expected constraints of planned profiles on velocities.
+//! 9. [`fit_indicator`]: the dependence of activity indicators on the spots; indicators in use are epochs, too.
 //! 10. `absorbing`: fields that absorb more of an orbit that is not in the model, for detection limits.
-//! 11. `errors`: how well the profiles tell the field.
+//! 11. `errors`: the uncertainties of the field.
 
 mod absorbing;
 mod basis;
@@ -64,36 +64,36 @@ use crate::surface::imaging::Imager;
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
 
-/// Mean of the field: the spot filling factor of a star of which nothing else is known. Profiles do not tell it.
+/// Mean of the field: the spot filling factor of a typical star. Profiles do not constrain it.
 pub const MEAN_FILLING: f64 = 0.06;
 
-/// Largest degree of the harmonics: finer than the line resolves. With 18, what is left over of a star of 40 km/s at
-/// S/N 1000 is taken for spots that change.
+/// Largest degree of the harmonics: finer than the line resolves. With 18, the residuals of a star of 40 km/s at S/N
+/// 1000 would be absorbed by evolving spots.
 pub const DEGREE: usize = 36;
 
-/// Times that maps are found with a jitter, along the slopes of those before, from maps without one.
+/// Iterations of maps with a jitter, each along the slopes of the previous ones, from maps without one.
 const JITTERED: usize = 2;
 
-/// What is assumed before the data, beside the parameters of star and orbit.
+/// The assumptions before the data, beside the parameters of star and orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Assumed {
     /// The spots.
     pub field: Field,
-    /// Scatter of the profiles' velocity zero points (km/s).
+    /// RV jitter of the profiles (km/s).
     pub jitter_kms: f64,
 }
 
-/// What is assumed and is no parameter.
+/// The assumptions that are not parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
     /// Degree below which the spectrum of the spots is flat.
     pub break_degree: f64,
-    /// Scatter of the profiles' velocity zero points (km/s).
+    /// RV jitter of the profiles (km/s).
     pub jitter_kms: f64,
 }
 
 impl Assumed {
-    /// The field among the parameters, beside what is no parameter.
+    /// The field among the parameters, together with the assumptions that are not parameters.
     pub fn of(values: &ParameterValues, Held { break_degree, jitter_kms }: Held) -> Self {
         let (amplitude, slope) = (values[Parameter::SpotAmplitude], values[Parameter::SpotSlope]);
         let spectrum = Spectrum { amplitude, slope, break_degree };
@@ -101,7 +101,7 @@ impl Assumed {
         Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms }
     }
 
-    /// What of it is no parameter.
+    /// The assumptions that are not parameters.
     pub fn held(&self) -> Held {
         Held { break_degree: self.field.spectrum.break_degree, jitter_kms: self.jitter_kms }
     }
@@ -115,7 +115,7 @@ impl Assumed {
     }
 }
 
-/// The profiles with all maps integrated out, linearised around the most probable ones.
+/// The profiles marginalised over all maps, linearised around the most probable ones.
 #[derive(Clone, Debug)]
 pub struct Marginal {
     /// The parameters, those of the field as assumed.
@@ -126,16 +126,16 @@ pub struct Marginal {
     pub basis: Arc<Basis>,
     /// The star's response.
     pub design: Arc<Design>,
-    /// The most probable maps (their coefficients, a column a profile and then a bin of light curves), and the evidence
-    /// there.
+    /// The most probable maps (their coefficients, one column per profile and then per bin of light curves), and the
+    /// evidence there.
     pub settled: Settled,
-    /// How the numbers of each epoch change with a velocity, once it is asked for.
+    /// Derivatives of the coefficients of each epoch with a velocity, once they are needed.
     velocity_slopes: OnceLock<Vec<DMatrix<f64>>>,
 }
 
 impl Marginal {
-    /// At `values`, whose design is given. Maps are found from those of a star and field `nearby`, or else from
-    /// uniform ones; with a jitter then from those without.
+    /// At `values`, with the design given. Maps are found from those of a star and field `nearby`, or else from uniform
+    /// ones; with a jitter then from those without.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -154,7 +154,7 @@ impl Marginal {
         Marginal::begun((imager, basis), design, values, assumed, (nearby, start))
     }
 
-    /// The same with the field of a `share` of the profiles, maps being found from those of the share.
+    /// The same with the field of a `share` of the profiles, with maps found from those of the share.
     fn of_share(
         imager: &Imager,
         basis: &Arc<Basis>,
@@ -167,7 +167,7 @@ impl Marginal {
         Marginal::begun((imager, basis), design, values, share.assumed, (None, start))
     }
 
-    /// The same by a star and field nearby, if there are any, maps being found from these coefficients (H, epochs).
+    /// The same for a star and field nearby, if there are any, with maps found from these coefficients (H, epochs).
     fn begun(
         (imager, basis): (&Imager, &Arc<Basis>),
         design: Arc<Design>,

@@ -1,4 +1,4 @@
-//! The maps of an evolving star held against the data: the field fitted, its most probable map and standard deviation
+//! The maps of an evolving star compared with the data: the field fitted, its most probable map and standard deviation
 //! at any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
 
 use super::light::misfits;
@@ -18,15 +18,15 @@ use crate::surface::{At, Explained, SpotField};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Profiles further apart than this (d) have maps of their own.
+/// Profiles further apart than this (d) have separate maps.
 const NIGHT_GAP_D: f64 = 0.5;
 
-/// Maps of a larger chi2 per datum do not explain the profiles: those of a right star and right errors have some 0.9.
+/// Maps of a larger chi2 per datum do not explain the profiles: with the right star and uncertainties it is about 0.9.
 const WORST_CHI2: f64 = 2.0;
 
 impl SurfaceMaps {
-    /// Fits the field of the star in `at` to the `observations` that its imager was made for, but for what is `known`
-    /// of it. Maps are those of `times_d`, by default of each night, or one where the spots are static.
+    /// Fits the field of the star in `at` to the `observations` that its imager was made for, except for what is
+    /// `known` of it. Maps are at `times_d`, by default one per night, or a single one where the spots are static.
     ///
     /// # Errors
     /// [`NoMaps`].
@@ -62,7 +62,7 @@ impl SurfaceMaps {
         let mut warnings: Vec<String> = SpotField::of(fitted).remarks().into_iter().map(|remark| remark.text).collect();
         warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
         let against = Against::new(imager, observations, marginal.values, &modelled.depths());
-        // of all planets, as the orbit beside them is
+        // including all planets, like the orbit velocities beside them
         let mut held = here.held.clone();
         marginal.values.motion().second.iter().for_each(|second| held.count_in(|cycle| second.velocity_kms(cycle)));
         let velocities = velocities(&held, &against);
@@ -108,7 +108,7 @@ impl SurfaceMaps {
     }
 }
 
-/// The profiles as the most probable maps of a field explain them.
+/// The profiles with the model of the most probable maps of a field.
 pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &Fitted) -> Explained {
     let marginal = &fitted.marginal;
     let modelled = Modelled::of(imager, marginal, &marginal.settled.coefficients);
@@ -119,8 +119,8 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
     Explained { chi2_per_datum: against.chi2() / observations.len() as f64, misfit, velocities: against.moments }
 }
 
-/// What is to be said of times of which the profiles tell little: those where the spots have less than this
-/// correlation with those of any profile.
+/// Times are poorly constrained by the profiles where the spots have less than this correlation with those of any
+/// profile.
 const FORGOTTEN: f64 = 0.1;
 
 fn far(times_d: &[f64], observations: &Observations, kernel: &Kernel) -> Option<String> {
@@ -137,9 +137,9 @@ fn far(times_d: &[f64], observations: &Observations, kernel: &Kernel) -> Option<
     })
 }
 
-/// Times (d) at which maps are asked for, from the first to the last.
+/// Times (d) of the requested maps, in order.
 fn in_order(times_d: &[f64]) -> Result<Vec<f64>, NoMaps> {
-    /// Beyond it (d) a time has no fractions of an hour in double precision.
+    /// Beyond it (d) a time in double precision does not resolve an hour.
     const FARTHEST_D: f64 = 1e12;
     let mut times_d = times_d.to_vec();
     times_d.sort_by(f64::total_cmp);
@@ -166,20 +166,20 @@ fn nights(times_d: &[f64]) -> Vec<f64> {
 }
 
 fn mean(x: &[f64]) -> f64 {
-    // of times near each other, far from 0
+    // for times near each other, far from 0
     x[0] + x.iter().map(|x_k| x_k - x[0]).sum::<f64>() / x.len() as f64
 }
 
 /// Model profiles of the most probable maps.
 struct Modelled {
-    /// All profiles, one after the other, nuisances included.
+    /// All profiles, one after the other, including nuisances.
     depth: Vec<f64>,
     bins: Vec<std::ops::Range<usize>>,
     estimates: Vec<Estimate>,
 }
 
 impl Modelled {
-    /// Of maps of these coefficients (H, profiles).
+    /// From maps of these coefficients (H, profiles).
     fn of(imager: &Imager, marginal: &Marginal, coefficients: &DMatrix<f64>) -> Self {
         let response = marginal.design.response();
         let mut depth = response.depths_of_each(&marginal.design.brightness(&marginal.basis, coefficients));

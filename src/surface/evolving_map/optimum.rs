@@ -1,6 +1,6 @@
-//! The search for the best parameters with an evolving map: it begins at the orbit that a blind search finds, with the
-//! field and the jitter as they are with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the top
-//! of the expansion, or what is higher beyond, becomes the next place to expand it around, until that place stays.
+//! The search for the best parameters with an evolving map: it begins at the orbit of a blind search, with the field
+//! and the jitter fitted together with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the maximum
+//! of the expansion, or a higher point beyond it, becomes the next point of expansion, until that point converges.
 
 use super::{Basis, Fitted, Forecast, Held, Known, MarginalPosterior, fit};
 use crate::field::FieldError;
@@ -14,16 +14,16 @@ use crate::surface::optimum::{
 use crate::surface::surrogate::Surrogate;
 use std::sync::Arc;
 
-/// Places that ln Z is expanded around at most: from an inclination that is far off it takes some.
+/// Largest number of expansions: a start far from the best inclination requires several.
 const MOST_ROUNDS: usize = 16;
 
-/// Parts of the way to the top of an expansion that are tried.
+/// Fractions of the step to the maximum of an expansion that are tried.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
-/// Where the top is higher, so many times the way is tried: curvatures of the expansion are often too large.
+/// Multiples of the step that are tried where the maximum is higher: curvatures of the expansion are often too large.
 const BEYOND: [f64; 2] = [2.0, 4.0];
 
-/// Log-probabilities of rounds as close as this count as the same: maps are found from others in each.
+/// Log-probabilities of rounds within this are considered equal: maps are found from others in each.
 const SAME: f64 = 0.1;
 
 pub(super) fn find(
@@ -46,7 +46,7 @@ pub(super) fn find(
         let values = space.clone().with_field_of(&field).values_at(&theta);
         let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, held) else { break };
         let here = posterior.evaluate(&theta);
-        // an expansion that has led astray: half of the way
+        // after a failed expansion: half of the step
         if let Some((before, height)) = &last
             && *height > here.log_prob + SAME
         {
@@ -60,7 +60,7 @@ pub(super) fn find(
         };
         let left_over = shift(space, &theta, &next);
         (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
-        // away from the best star curvatures may be negative, and no measure of the way
+        // away from the best star curvatures may be negative, and give no scale for the step
         let stays = shift(space, &theta, &next) < REFERENCE_SHIFT && next.evaluation.log_prob - height < SAME;
         settled = stays && left_over < REFERENCE_SHIFT;
         last = Some((std::mem::replace(&mut theta, next.theta.clone()), height));
@@ -75,8 +75,9 @@ pub(super) fn find(
     Ok(Best { posterior, optimum, attempts })
 }
 
-/// The first of ever shorter parts of the way from a point to the top of the expansion around it that leads up, or what
-/// is higher beyond the top; the point itself, where none does. Far from the best star the expansion promises too much.
+/// The first of progressively shorter steps from a point towards the maximum of the expansion around it that leads up,
+/// or a higher point beyond that maximum; the point itself, where none does. Far from the best star the expansion
+/// overestimates the gain.
 fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64]) -> (Vec<f64>, Evaluation) {
     let (theta, here) = from;
     let evaluated = |share: &f64| {
@@ -99,16 +100,16 @@ fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64])
     best
 }
 
-/// Part of the way between two points.
+/// A fraction of the step between two points.
 fn on_the_way(space: &ParameterSpace, from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
     let (a, b) = (space.to_sampling(from), space.to_sampling(to));
     space.to_physical(&a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect::<Vec<_>>())
 }
 
-/// Where to begin: vector, field and jitter.
+/// The start: vector, field and jitter.
 type Start = (Vec<f64>, ParameterValues, Held);
 
-/// The highest of the maxima that the expansion around the star without a planet has, the field fitted anew there.
+/// The highest of the maxima of the expansion around the star without a planet, with the field fitted again there.
 fn without_search(sought: Sought, known: Known) -> Result<Start, SearchError> {
     let Sought { imager, space, other_starts, .. } = sought;
     let start = space.start();
@@ -121,7 +122,7 @@ fn without_search(sought: Sought, known: Known) -> Result<Start, SearchError> {
     let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
     let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
     let theta = best.end.clone()?.theta;
-    // with the planet in the model the field and the jitter are others
+    // with the planet in the model the field and the jitter differ
     let with_orbit = first.space().values_at(&theta);
     Ok(match fit(imager, &basis, with_orbit, known, Some(&fitted)) {
         Ok(Fitted { marginal, .. }) => {
@@ -141,7 +142,7 @@ fn forecast(posterior: &MarginalPosterior) -> Result<Forecast<'_>, SearchError> 
     Ok(Forecast { space: posterior.space(), expansion: posterior.expansion()? })
 }
 
-/// The values at `theta`, without a planet where one is looked for.
+/// The values at `theta`, without a planet where one is searched for.
 fn without_planet(space: &ParameterSpace, theta: &[f64]) -> ParameterValues {
     let mut values = space.values_at(theta);
     for of in &Elements::PLANETS {
@@ -152,7 +153,7 @@ fn without_planet(space: &ParameterSpace, theta: &[f64]) -> ParameterValues {
     values
 }
 
-/// Where to climb from: the config's values, and the peaks over the periods.
+/// The starts of climbs: the config's values, and the peaks over the periods.
 fn starts(posterior: &MarginalPosterior, first: &[f64], others: usize) -> Result<Vec<Vec<f64>>, SearchError> {
     let space = posterior.space();
     let surrogate = Surrogate::of_expansion(posterior.expansion()?, space, posterior.imager());

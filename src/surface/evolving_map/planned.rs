@@ -1,6 +1,6 @@
-//! What profiles will say of velocities, before there are any: the information `D'^T C^-1 D'` (`docs/method.md`
-//! section 9) holds star, field, times and noise, but no data. What it depends on beside is the map that model and
-//! slopes are made linear at: one that is drawn from the field, given the data that there are.
+//! Expected constraints of planned profiles on velocities: the information `D'^T C^-1 D'` (`docs/method.md` section 9)
+//! contains star, field, times and noise, but no data. It also depends on the map at which model and slopes are
+//! linearised: one that is drawn from the field, given the existing data.
 
 use super::expand::{summed, with_integrated};
 use super::light::Light;
@@ -15,10 +15,10 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Stream of the random numbers of maps.
+/// Random-number stream of the maps.
 const STREAM: u64 = 5;
 
-/// Profiles and light curves that are planned beside those that have been taken, of one star. Epochs are profiles, and
+/// Planned profiles and light curves together with those that have been taken, of one star. Epochs are profiles, and
 /// then bins of light curves.
 #[derive(Debug)]
 pub struct Planned<'a> {
@@ -26,9 +26,9 @@ pub struct Planned<'a> {
     imager: &'a Imager,
     /// Spots before the data, jitter.
     assumed: Assumed,
-    /// What is integrated out.
+    /// Parameters that are marginalised over.
     nuisances: &'a [Nuisance],
-    /// What has been taken, and numbers of its epochs among all.
+    /// The data taken, and the indices of their epochs among all.
     taken: Option<(&'a Marginal, &'a [usize])>,
     values: ParameterValues,
     basis: Basis,
@@ -36,8 +36,8 @@ pub struct Planned<'a> {
 }
 
 impl<'a> Planned<'a> {
-    /// Of a star at `values`, without a planet, with the data of `imager`, among which those of `taken` have these
-    /// numbers.
+    /// For a star at `values`, without a planet, with the data of `imager`, among which those of `taken` have these
+    /// indices.
     pub fn new(
         imager: &'a Imager,
         mut values: ParameterValues,
@@ -56,7 +56,7 @@ impl<'a> Planned<'a> {
         DMatrix::zeros(self.basis.len(), self.imager.times_of_all_d().len())
     }
 
-    /// Coefficients (H, epochs) of a map drawn for the time of each epoch: the most probable ones where data have been
+    /// Coefficients (H, epochs) of a map drawn at the time of each epoch: the most probable ones where data have been
     /// taken.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl<'a> Planned<'a> {
         Ok(maps)
     }
 
-    /// The quadratic in the orbit's velocities, without a gradient, of each of some `parts` (numbers of epochs) for
+    /// The quadratic in the orbit's velocities, without a gradient, of each of some `parts` (indices of epochs) for
     /// maps with these coefficients (H, epochs).
     ///
     /// # Errors
@@ -106,7 +106,7 @@ impl<'a> Planned<'a> {
             if self.assumed.jitter_kms > 0.0 {
                 epoch = epoch.jittered(&[share * self.assumed.jitter_kms]);
             }
-            // where ln Z would be expanded says nothing of information
+            // the point around which ln Z would be expanded does not affect the information
             Epoch { slopes, divisor: DVector::zeros(0), ..epoch }
         };
         self.design.epochs(self.imager, maps).into_iter().zip(slopes).zip(shares).map(noisy).collect()
@@ -114,7 +114,7 @@ impl<'a> Planned<'a> {
 
     fn of_part(&self, maps: &DMatrix<f64>, epochs: &[Epoch], part: &[usize]) -> Result<VelocityQuadratic, FieldError> {
         let count = self.imager.profiles().count();
-        // profiles first, as everywhere
+        // profiles first, as in all designs
         let (profiles, bins): (Vec<usize>, Vec<usize>) = part.iter().partition(|k| **k < count);
         let part = &[&profiles[..], &bins].concat();
         let some: Vec<Epoch> = part.iter().map(|k| epochs[*k].clone()).collect();
@@ -145,7 +145,7 @@ impl<'a> Planned<'a> {
         Ok(VelocityQuadratic { gradient: DVector::zeros(velocities.len()), ..velocities })
     }
 
-    /// The star's own parameters among the nuisances.
+    /// The stellar parameters among the nuisances.
     fn stellar(&self) -> Vec<Parameter> {
         self.nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect()
     }

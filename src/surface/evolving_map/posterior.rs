@@ -1,9 +1,10 @@
-//! The log-probability of a parameter vector where all maps are integrated over: ln Z (`docs/method.md` section 9)
-//! times the prior.
+//! The log-probability of a parameter vector, marginalised over all maps: ln Z (`docs/method.md` section 9) times the
+//! prior.
 //!
 //! Every evaluation begins from the maps of one reference, so that it is a function of the vector alone. Where only the
-//! orbit is free ln Z is the quadratic of the reference. Where the field is free the maps are found anew, and the orbit
-//! is that of the quadratic around them. Where the star is free its profiles are made anew as well.
+//! orbit is free ln Z is the quadratic of the reference. Where the field is free the maps are recomputed, and the orbit
+//! is that of the quadratic around them. Where stellar parameters are free the profiles of the star are recomputed as
+//! well.
 
 use super::climb::{assumed_at, place};
 use super::{Assumed, Basis, Design, Held, Marginal};
@@ -20,34 +21,34 @@ use std::sync::{Arc, OnceLock};
 /// Name of ln Z beside a log-probability.
 pub const LN_EVIDENCE: &str = "ln_evidence";
 
-/// Step in ln amplitude, slope or ln lifetime by which the change of maps is found, and how far it is followed: maps of
-/// another field are found in a ninth less time from where it leads.
+/// Step in ln amplitude, slope or ln lifetime for the derivatives of the maps, and the largest step of their
+/// extrapolation: finding maps of another field from there saves a ninth of the time.
 const STEP: f64 = 0.2;
 const FAR: f64 = 0.6;
 
-/// Applications of the model that velocities and misfits of maps take.
+/// Model applications for velocities and misfits of maps.
 const SLOPES: u32 = 3;
 
-/// The posterior of the free parameters, all maps integrated out.
+/// The posterior of the free parameters, marginalised over all maps.
 #[derive(Clone, Debug)]
 pub struct MarginalPosterior {
     pub(super) imager: Imager,
     pub(super) space: ParameterSpace,
     pub(super) reference: Arc<Marginal>,
-    /// Change of its most probable maps with each number of the field; none where maps are not found anew.
+    /// Derivatives of its most probable maps with each parameter of the field; none where maps are not recomputed.
     along: Arc<Vec<(usize, DMatrix<f64>)>>,
     /// ln Z of the reference in the velocities of the profiles.
     velocities: Arc<Expansion>,
     anew: Anew,
     nearby: Arc<Nearby>,
-    /// To second order in all that is free, once it is asked for.
+    /// To second order in all free parameters, once it is needed.
     pub(super) expansion: Arc<OnceLock<Result<Expansion, FieldError>>>,
 }
 
-/// What an evaluation makes anew.
+/// What an evaluation recomputes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Anew {
-    /// Nothing: the orbit alone is free.
+    /// Nothing: only the orbit is free.
     Nothing,
     /// The maps.
     Maps,
@@ -56,7 +57,7 @@ enum Anew {
 }
 
 impl MarginalPosterior {
-    /// The posterior of `space` around `values`, those of the field among them. Maps are found from uniform ones: the
+    /// The posterior of `space` around `values`, including those of the field. Maps are found from uniform ones: the
     /// same values give the same bytes.
     ///
     /// # Errors
@@ -97,28 +98,28 @@ impl MarginalPosterior {
         self.velocities.log_likelihood
     }
 
-    /// Where evaluations begin.
+    /// The start of evaluations.
     pub fn reference(&self) -> &Marginal {
         &self.reference
     }
 
-    /// The parameter space; what is fixed of the field is as in the reference.
+    /// The parameter space; fixed parameters of the field have the values of the reference.
     pub fn space(&self) -> &ParameterSpace {
         &self.space
     }
 
-    /// What the data are imaged with.
+    /// Star and data.
     pub fn imager(&self) -> &Imager {
         &self.imager
     }
 
-    /// The free parameters that an expansion holds beside the velocities: of the star, then of the field.
+    /// The free parameters of an expansion beside the velocities: stellar ones, then those of the field.
     pub(super) fn coordinates(&self) -> Vec<Parameter> {
         let is_free = |p: &Parameter| self.space.free().iter().any(|f: &FreeParameter| f.parameter == *p);
         free_stellar(self.space.free()).into_iter().chain(Parameter::FIELD.into_iter().filter(is_free)).collect()
     }
 
-    /// The maps at `values`, found from those of the reference; profiles of the star made anew if `star`.
+    /// The maps at `values`, found from those of the reference; the profiles of the star are recomputed if `star`.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -148,7 +149,7 @@ impl MarginalPosterior {
         values.with_orbits_of(&self.reference.values)
     }
 
-    /// ln Z at `theta` (physical coordinates), whatever the prior says, with itself beside it.
+    /// ln Z at `theta` (physical coordinates) without the prior, with ln Z itself as the other value.
     pub fn likelihood(&self, theta: &[f64]) -> Evaluation {
         let values = self.space.values_at(theta);
         if !is_physical(&self.imager, &values, theta) {
@@ -174,7 +175,7 @@ impl MarginalPosterior {
         }
     }
 
-    /// Whether an evaluation finds maps, but leaves the profiles of the star as they are.
+    /// Whether an evaluation recomputes the maps, but not the profiles of the star.
     pub(super) fn finds_only_maps_anew(&self) -> bool {
         self.anew == Anew::Maps
     }
@@ -190,8 +191,8 @@ impl MarginalPosterior {
     }
 }
 
-/// Change of the most probable maps of `reference` with its ln amplitude, slope and ln lifetime, as far as it has them:
-/// those of other fields are found from where it leads to.
+/// Derivatives of the most probable maps of `reference` with its ln amplitude, slope and ln lifetime, as far as it has
+/// them: maps of other fields are found from their extrapolation.
 fn along_the_field(imager: &Imager, reference: &Marginal) -> Result<Vec<(usize, DMatrix<f64>)>, FieldError> {
     let here = place(&reference.assumed);
     let along = |i: usize| {

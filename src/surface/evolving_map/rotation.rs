@@ -1,9 +1,9 @@
-//! Whether the star turns with another period than it is said to: ln Z at others.
+//! Test for another rotation period than the given one: ln Z at other periods.
 //!
-//! At a wrong rotation period no map lasts. The lifetime of the spots falls until maps of single nights explain the
-//! profiles, each by itself, and such maps explain planets, too. So where the lifetime is short against what maps need
-//! to agree, other periods are tried with spots that last; where ln Z is highest the field is fitted, as it is at the
-//! period that is given.
+//! At a wrong rotation period no map lasts. The fitted lifetime of the spots falls until maps of single nights explain
+//! the profiles, each by itself, and such maps absorb planets, too. So where the lifetime is too short for maps to
+//! agree, other periods are tried with long-lived spots; where ln Z is highest the field is fitted, as at the given
+//! period.
 
 use super::fit::{fit, share_of_many};
 use super::{Assumed, Basis, Design, Known, Marginal};
@@ -15,14 +15,14 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Spots that live this many rotations hold the rotation period to a few per cent: it cannot be wrong by more.
+/// Spots that live this many rotations constrain the rotation period to a few per cent: it cannot be wrong by more.
 const LASTING: f64 = 6.0;
 
 /// Largest factor on the rotation period that is tried, and its inverse.
 const FURTHEST: f64 = 2.5;
 
-/// Steps in ln of the period, the lifetimes in rotations that they are fine enough for, and how many of the highest
-/// periods are looked at more closely then.
+/// Steps in ln of the period, the lifetimes in rotations for which they are fine enough, and how many of the highest
+/// periods are then refined.
 const COARSE: (f64, f64, usize) = (0.05, 4.0, 3);
 const FINER: [(f64, f64, usize); 2] = [(0.0125, 12.0, 1), (0.004, 24.0, 1)];
 
@@ -32,11 +32,11 @@ const STEPS: i32 = 4;
 /// Harmonics up to this degree: enough to find the period, at a third of the cost.
 const DEGREE: usize = 22;
 
-/// ln Z that the other period has to gain: of odds of 20,000 to 1.
+/// The gain in ln Z that another period requires: odds of 20,000 to 1.
 const GAIN: f64 = 10.0;
 
-/// A period that is off by more, in ln, is another one. On the star of `tests/data/newcomer/planet.json` sigma_K is
-/// 0.016 km/s at 1 % off, as at the right period (0.015), and 0.025 at 3 %.
+/// A period that differs by more, in ln, is another one. On the star of `tests/data/newcomer/planet.json` sigma_K is
+/// 0.016 km/s at an error of 1 %, as at the right period (0.015), and 0.025 at 3 %.
 const FAR: f64 = 0.02;
 
 /// A rotation period with which the spots last.
@@ -44,17 +44,17 @@ const FAR: f64 = 0.02;
 pub struct OtherRotation {
     /// The period (d).
     pub rotation_period_d: f64,
-    /// The one that is given (d).
+    /// The given period (d).
     pub given_period_d: f64,
-    /// ln Z there over that with the given one.
+    /// ln Z there relative to the given one.
     pub ln_evidence_gain: f64,
     /// Lifetimes of the spots (d), there and with the given one.
     pub spot_lifetime_d: [f64; 2],
 }
 
 impl OtherRotation {
-    /// With which the profiles of `imager` are far more probable than with that in `values`, where the field is `near`
-    /// this one; `None` where the spots last, their lifetime is given, or no period is better.
+    /// The period with which the profiles of `imager` are far more probable than with that in `values`, where the field
+    /// is `near` this one; `None` where the spots last, their lifetime is given, or no period is better.
     pub fn of(imager: &Imager, values: ParameterValues, near: Assumed, known: Known) -> Option<Self> {
         let given_period_d = TAU / values.star.omega_eq_rad_d;
         let lifetime_d = near.field.kernel.lifetime.days()?;
@@ -103,12 +103,12 @@ impl OtherRotation {
         (found.ln_evidence_gain > GAIN && found.spot_lifetime_d[0] > 0.0).then_some(found)
     }
 
-    /// Whether it is another one by so much that maps with the given one say nothing of velocities.
+    /// Whether it differs by so much that maps with the given one do not constrain velocities.
     pub fn is_far(&self) -> bool {
         (self.rotation_period_d / self.given_period_d).ln().abs() > FAR
     }
 
-    /// What is to be said of it.
+    /// The message.
     pub fn sentence(&self) -> String {
         let OtherRotation { rotation_period_d, given_period_d, ln_evidence_gain, spot_lifetime_d: [there, here] } =
             self;

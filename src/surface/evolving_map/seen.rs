@@ -1,9 +1,10 @@
-//! The harmonics that data see: the same maps in fewer numbers (`docs/explanation/evolving-maps.md`).
+//! The harmonics to which data are sensitive: the same maps with fewer coefficients
+//! (`docs/explanation/evolving-maps.md`).
 //!
-//! All harmonics of a degree have one prior variance, whatever directions they are counted along. So those directions
-//! of which the data see next to nothing can be left out, and tell nothing of the others. A star of 30 km/s with a line
-//! of 3.6 km/s leaves out four of ten, and evaluations with other spots take half of the time. The filter of many
-//! profiles (`field::filter`) goes on from these to directions over all degrees, which are others for each field.
+//! All harmonics of a degree have one prior variance, in any basis. So those directions to which the data are hardly
+//! sensitive can be omitted, without effect on the others. A star of 30 km/s with a line of 3.6 km/s omits four of ten,
+//! and evaluations with other spots take half of the time. The filter of many profiles (`field::filter`) proceeds from
+//! these to directions over all degrees, which differ for each field.
 
 use super::condense::ROUGHEST;
 use super::{Basis, Design};
@@ -13,39 +14,39 @@ use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
-/// Largest variance of all data together, over that of the noise of one, by harmonics that are left out, of the
-/// roughest spots: of usual ones an error of ln Z of some 2e-3 (`tests/method/marginal.rs`).
+/// Largest variance of all data together, relative to the noise of one, by harmonics that are omitted, for the roughest
+/// spots: for usual ones an error of ln Z of some 2e-3 (`tests/method/marginal.rs`).
 const LEFT_OUT: f64 = 0.2;
 
-/// Steps after which eigenvalues of a degree are given up: some 2 a number are usual.
+/// Steps after which eigenvalues of a degree are given up: some 2 per coefficient are usual.
 const MOST_ROTATIONS: usize = 10_000;
 
 /// A combination of the harmonics of one degree.
 struct Direction {
     /// Which harmonics.
     of: Range<usize>,
-    /// How much of each.
+    /// Its components.
     along: DVector<f64>,
-    /// Variance of the data by it, in units of their noise, of the roughest spots.
+    /// Variance of the data by it, in units of their noise, for the roughest spots.
     variance: f64,
 }
 
 impl Basis {
-    /// Those that the data of `imager` see of a star at `values`, the same otherwise.
+    /// The harmonics to which the data of `imager` are sensitive for a star at `values`, otherwise the same.
     pub fn seen(imager: &Imager, values: &ParameterValues) -> Self {
         let all = Basis::new(&imager.grid);
         let design = Design::new(imager, &all, &values.state());
         all.seen_by(imager, &design)
     }
 
-    /// Combinations of the harmonics of each degree, those of which the data of a `design` with all of them see more
-    /// than next to nothing; all, where there is no design.
+    /// Combinations of the harmonics of each degree to which the data of a `design` with all harmonics are
+    /// significantly sensitive; all, where there is no design.
     fn seen_by(&self, imager: &Imager, design: &Design) -> Self {
         let variances = ROUGHEST.variances(&self.degrees);
         let mut directions: Vec<Direction> = Vec::with_capacity(self.len());
         for of in self.each_degree() {
             let information = design.information(imager, of.clone());
-            // of what is not finite there is no end
+            // no convergence for values that are not finite
             let Some(eigen) = information.try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS) else {
                 return self.clone();
             };
@@ -61,7 +62,7 @@ impl Basis {
             left_out += directions[*i].variance;
             left_out <= LEFT_OUT
         };
-        // of noise alone one is kept
+        // with noise alone one is kept
         let first = order.iter().copied().take_while(is_left_out).count().min(order.len() - 1);
         let mut seen = order.split_off(first);
         let unseen = order;
@@ -79,7 +80,7 @@ impl Basis {
         }
     }
 
-    /// Which harmonics are of each degree.
+    /// The range of harmonics of each degree.
     fn each_degree(&self) -> impl Iterator<Item = Range<usize>> {
         let mut end = 0;
         self.degrees.of_each.chunk_by(|a, b| a == b).map(move |of| {

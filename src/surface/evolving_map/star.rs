@@ -1,9 +1,9 @@
-//! What the profiles say of the star itself: the numbers of its line and of active regions for which ln Z is largest,
-//! together with the field, which they change (`docs/method.md` section 9).
+//! The fit of stellar parameters: those of the line and of active regions for which ln Z is largest, together with the
+//! field, which depends on them (`docs/method.md` section 9).
 //!
-//! ln Z is climbed by Newton's steps. Its gradient is one of differences, as the determinant counts; its second
-//! derivatives are those of the linearised model, improved from step to step. Harmonics up to a low degree do: they say
-//! the same of lines.
+//! ln Z is climbed by Newton's steps. Its gradient is from differences, because the determinant counts; its second
+//! derivatives are those of the linearised model, improved from step to step. Harmonics up to a low degree suffice:
+//! they give the same lines.
 
 use super::climb::{LEAST_BEND, USUAL_BEND, assumed_at, limits as limits_of_field, place as place_of_field};
 use super::fit::{fit, share_of};
@@ -24,23 +24,23 @@ pub(super) const DEGREE: usize = 18;
 const GAIN: f64 = 1.0;
 const STEPS: usize = 12;
 
-/// So many steps with all profiles follow those with a share of them.
+/// So many steps with all profiles follow those with a subset of them.
 const LAST_STEPS: usize = 2;
 
-/// Numbers of a climb that are not the star's: ln amplitude, slope, ln lifetime and ln jitter of the field, ln size of
-/// what is wrong alike in all profiles.
+/// Parameters of a climb that are not stellar: ln amplitude, slope, ln lifetime and ln jitter of the field, ln size of
+/// the error common to all profiles.
 const OF_FIELD: usize = 5;
 const SIZE: usize = 4;
 
-/// Where its size begins, its bounds, and the standard deviation of its prior; at the lower bound there is nothing.
+/// Start of its size, its bounds, and the standard deviation of its prior; at the lower bound there is none.
 const MEAN_PROFILE: f64 = 1e-3;
 const MEAN_PROFILES: (f64, f64) = (2e-5, 0.1);
 const MEAN_PROFILE_SD: f64 = 5e-3;
 
-/// Least surface of active regions per filling factor of spots that a climb goes down to.
+/// Smallest surface of active regions per filling factor of spots in a climb.
 const LEAST_AREA: f64 = 0.02;
 
-/// A climb with more profiles than this starts from that with a share of them.
+/// A climb with more profiles than this starts from that with a subset of them.
 const FEW: usize = 24;
 
 /// Longest step in a coordinate.
@@ -53,37 +53,37 @@ const MOST_AT_FIRST: f64 = 0.3;
 const DAMPING: f64 = 0.05;
 const MOST_DAMPING: f64 = 1e3;
 
-/// A number that is fitted: its Gaussian prior, where a climb begins, and its bounds.
+/// A fitted parameter: its Gaussian prior, the start of a climb, and its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StarPrior {
-    /// Which.
+    /// The parameter.
     pub parameter: Parameter,
     /// Mean of the prior.
     pub mean: f64,
     /// Standard deviation of the prior.
     pub sd: f64,
-    /// Where a climb begins.
+    /// The start of a climb.
     pub start: f64,
     /// Bounds.
     pub bounds: (f64, f64),
-    /// Whether it is free whatever is fitted: chains and searches find it.
+    /// Whether it is free in any case: chains and searches find it.
     pub is_free: bool,
 }
 
 /// The most probable star.
 #[derive(Clone, Debug)]
 pub struct FittedStar {
-    /// All parameters, those that were fitted and those of the field among them.
+    /// All parameters, including those that were fitted and those of the field.
     pub values: ParameterValues,
     /// Standard deviations of those that were fitted.
     pub sd: Vec<f64>,
-    /// Size of what is wrong alike in all profiles.
+    /// Size of the error common to all profiles.
     pub mean_profile: f64,
     /// ln Z, with harmonics up to a low degree.
     pub ln_evidence: f64,
     /// ln of the prior density.
     pub ln_prior: f64,
-    /// The field that goes with it.
+    /// The field fitted together with it.
     pub assumed: Assumed,
 }
 
@@ -94,16 +94,16 @@ struct Point {
     height: f64,
 }
 
-/// Where a climb ends.
+/// The end of a climb.
 struct Top {
     point: Point,
     /// Minus the second derivatives.
     bend: DMatrix<f64>,
-    /// Those along each number of the field.
+    /// Those along each parameter of the field.
     of_field: [f64; OF_FIELD],
 }
 
-/// The way up.
+/// A climb.
 #[derive(Clone)]
 struct Climb<'a> {
     imager: &'a Imager,
@@ -123,7 +123,7 @@ pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> R
     fit(imager, &Arc::new(Basis::coarse(&imager.grid, DEGREE)), values, known, None)
 }
 
-/// The slopes of drifts of the velocities (km/s per day) by the field `near`, beside no orbit, where one is steep.
+/// The slopes of drifts of the velocities (km/s per day) by the field `near`, without an orbit, where one is steep.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -136,10 +136,10 @@ pub fn slopes(imager: &Imager, near: &Fitted, nuisances: &[Nuisance]) -> Result<
     Ok(constants::slopes(&held, imager, nuisances, marginal.values[Parameter::Vsys]))
 }
 
-/// Fits numbers of the star, and the size of what is wrong alike in all profiles, beginning from the field of `near`:
-/// first those of the line, if there are any, then all with a share of the profiles, then with all of them. Where the
-/// share says that they gain less than `needed` in ln Z and ln of their prior, or maps of all profiles are not found
-/// from there, it stays at what it says.
+/// Fits stellar parameters, and the size of the error common to all profiles, beginning from the field of `near`: first
+/// those of the line, if there are any, then all with a subset of the profiles, then with all of them. Where the subset
+/// gives a gain of less than `needed` in ln Z and ln of their prior, or maps of all profiles are not found from there,
+/// its result is returned.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -189,8 +189,8 @@ pub fn fit_star(
     }
 }
 
-/// The coordinate of a number of active regions in which the profiles are nearly linear: what their line changes goes
-/// with the surface that they cover.
+/// The coordinate of a parameter of active regions in which the profiles are nearly linear: the effects of their line
+/// are proportional to the surface that they cover.
 fn coordinate(parameter: Parameter, x: f64, area: f64) -> f64 {
     match parameter {
         Parameter::RegionLineWidth => area * (x * x - 1.0),
@@ -202,7 +202,7 @@ fn coordinate(parameter: Parameter, x: f64, area: f64) -> f64 {
     }
 }
 
-/// The number of active regions at a coordinate.
+/// The parameter of active regions at a coordinate.
 fn number(parameter: Parameter, coordinate: f64, area: f64) -> f64 {
     match parameter {
         Parameter::RegionLineWidth => (1.0 + coordinate / area).max(0.0).sqrt(),
@@ -225,7 +225,7 @@ impl StarPrior {
 }
 
 impl<'a> Climb<'a> {
-    /// The way up for the numbers that have `priors`, those of the line first.
+    /// The climb for the parameters that have `priors`, those of the line first.
     fn new(imager: &'a Imager, known: &'a Known, assumed: &Assumed, priors: &'a [StarPrior]) -> Self {
         let ends = |prior: &StarPrior| match prior.parameter {
             Parameter::RegionArea => (prior.bounds.0.max(LEAST_AREA).ln(), prior.bounds.1.ln()),
@@ -233,19 +233,19 @@ impl<'a> Climb<'a> {
         };
         let size = (MEAN_PROFILES.0.ln(), MEAN_PROFILES.1.ln());
         let limits = limits_of_field(known).into_iter().chain([size]).chain(priors.iter().map(ends)).collect();
-        // who trusts the line trusts the mean profile
+        // the mean profile is free only if the line is fitted
         let free = known.free(assumed).into_iter().chain([priors.iter().any(StarPrior::is_fitted_line)]).collect();
         Climb { imager, basis: Arc::new(Basis::coarse(&imager.grid, DEGREE)), known, priors, free, limits }
     }
 
-    /// Where it begins.
+    /// The start.
     fn start(&self, assumed: &Assumed, values: &ParameterValues) -> DVector<f64> {
         let area = self.priors.iter().find(|prior| prior.parameter == Parameter::RegionArea);
         let area = area.map(|prior| prior.start).or(values.get(Parameter::RegionArea)).unwrap_or(1.0);
         let of_star = self.priors.iter().map(|prior| coordinate(prior.parameter, prior.start, area));
         let size: f64 = if self.free[SIZE] { MEAN_PROFILE } else { 0.0 };
         let mut of_field = place_of_field(assumed);
-        // more spots than usual stand in for what is to be found
+        // more spots than usual mimic the parameters to be found
         if self.known.amplitude.is_none() {
             of_field[0] = of_field[0].min(MOST_AT_FIRST.ln()).max(self.limits[0].0);
         }
@@ -253,7 +253,7 @@ impl<'a> Climb<'a> {
         DVector::from_iterator(OF_FIELD + self.priors.len(), all)
     }
 
-    /// The place with coordinates of numbers within their bounds.
+    /// The point with coordinates of parameters within their bounds.
     fn inside(&self, place: &DVector<f64>, values: &ParameterValues) -> DVector<f64> {
         let mut inside = place.clone();
         let numbers = self.numbers(place, values);
@@ -265,7 +265,7 @@ impl<'a> Climb<'a> {
         inside
     }
 
-    /// The star's numbers there.
+    /// The stellar parameters there.
     fn numbers(&self, place: &DVector<f64>, values: &ParameterValues) -> Vec<f64> {
         let of_star = || self.priors.iter().zip(place.iter().skip(OF_FIELD));
         let inside = |prior: &StarPrior, x: f64| x.clamp(prior.bounds.0, prior.bounds.1);
@@ -275,7 +275,7 @@ impl<'a> Climb<'a> {
         of_star().map(|(prior, x)| inside(prior, number(prior.parameter, *x, area))).collect()
     }
 
-    /// A point, its profiles condensed to the numbers of those `near`.
+    /// A point, its profiles compressed with the coefficients of those `near`.
     fn at(&self, place: &DVector<f64>, near: &Marginal) -> Result<Point, FieldError> {
         self.condensed_at(place, near, Some(&near.design))
     }
@@ -308,7 +308,7 @@ impl<'a> Climb<'a> {
         self.priors.iter().zip(numbers).map(off).sum()
     }
 
-    /// How the star's numbers change with their coordinates.
+    /// Derivatives of the stellar parameters with their coordinates.
     fn jacobian(&self, at: &Point) -> DMatrix<f64> {
         const H: f64 = 1e-4;
         let count = self.priors.len();
@@ -347,15 +347,15 @@ impl<'a> Climb<'a> {
         Ok(bend)
     }
 
-    /// The same, with those along each number of the field.
+    /// The same, with those along each parameter of the field.
     fn with_field(&self, at: &Point, of_field: &[f64; OF_FIELD]) -> Result<DMatrix<f64>, FieldError> {
         let mut bend = self.bend(at)?;
         of_field.iter().enumerate().for_each(|(i, along)| bend[(i, i)] = *along);
         Ok(bend)
     }
 
-    /// The gradient, by differences over steps that change the height by some half: central ones, which give minus the
-    /// second derivatives along each number, too, or one-sided ones where these are known well.
+    /// The gradient, by differences over steps that change the height by about a half: central ones, which also give
+    /// minus the second derivatives along each parameter, or one-sided ones where these are known well.
     fn gradient(&self, at: &Point, bend: &DMatrix<f64>, central: bool) -> (DVector<f64>, DVector<f64>) {
         let along = |i: usize| {
             if !self.is_free(i) {
@@ -383,15 +383,15 @@ impl<'a> Climb<'a> {
                 (None, None) => (0.0, bend[(i, i)]),
             }
         };
-        // once, before all ask for it
+        // once, before all threads need it
         at.marginal.settled.evidence.explained();
         let all: Vec<(f64, f64)> = (0..self.limits.len()).into_par_iter().map(along).collect();
         let of = |which: &dyn Fn(&(f64, f64)) -> f64| DVector::from_iterator(all.len(), all.iter().map(which));
         (of(&|a| a.0), of(&|a| a.1))
     }
 
-    /// The way up, by Newton's steps, damped as those of Levenberg and Marquardt (Nocedal & Wright 2006, section 10.3).
-    /// Second derivatives along the numbers of the field are measured, unless they are known.
+    /// The climb by Newton's steps, damped as by Levenberg and Marquardt (Nocedal & Wright 2006, section 10.3). Second
+    /// derivatives along the parameters of the field are measured, unless they are known.
     fn up(&self, mut here: Point, of_field: Option<[f64; OF_FIELD]>) -> Result<Top, FieldError> {
         let count = self.limits.len();
         let mut bend = self.with_field(&here, &of_field.unwrap_or([USUAL_BEND; OF_FIELD]))?;
@@ -424,7 +424,7 @@ impl<'a> Climb<'a> {
                 damped.cholesky().map(|factor| factor.solve(&inside))
             };
             let Some(hoped) = way(damping).map(|way| 0.5 * inside.dot(&way)) else {
-                // what was learnt on the way does not go with the star's part
+                // the previous updates do not apply to the stellar part
                 match learnt {
                     true => (bend, learnt) = (self.with_field(&here, &of_field)?, false),
                     false => break,
@@ -446,7 +446,7 @@ impl<'a> Climb<'a> {
             if gained < 0.3 * GAIN {
                 break;
             }
-            // the star's part anew; what is left is learnt on the way (BFGS; chapter 6 there)
+            // the stellar part is recomputed; the rest is updated along the climb (BFGS; chapter 6 there)
             let of_star = self.bend(&here)?;
             let corner = (OF_FIELD, OF_FIELD);
             let size = (count - OF_FIELD, count - OF_FIELD);

@@ -20,17 +20,17 @@ use crate::surface::{
 };
 use std::sync::Arc;
 
-/// Spots that come and go: a Gaussian field, marginalised.
+/// Evolving spots: a Gaussian field, marginalised over.
 #[derive(Clone, Debug)]
 pub struct EvolvingMap {
-    /// What is known of the field before the data.
+    /// Prior knowledge of the field.
     known: Known,
-    /// Bounds that its fit reached, where it is held as it was fitted.
+    /// Bounds that its fit reached, where it is held as fitted.
     at_bounds: Option<Vec<&'static str>>,
 }
 
 impl EvolvingMap {
-    /// What it is.
+    /// Its properties.
     pub const PROPERTIES: Properties = Properties {
         name: "evolving map",
         under_way: "fitting the field of spots",
@@ -41,7 +41,7 @@ impl EvolvingMap {
         has_target: false,
     };
 
-    /// Of a field of which that is `known`.
+    /// A field with these `known` parameters.
     pub fn new(known: Known) -> Self {
         EvolvingMap { known, at_bounds: None }
     }
@@ -109,7 +109,7 @@ impl SurfaceModel for EvolvingMap {
         false
     }
 
-    /// Profiles are taken out of the evidence: the field, and the maps around which profiles are linear, stay.
+    /// Profiles are removed from the evidence: the field, and the maps around which profiles are linear, stay.
     fn without_each(
         &self,
         at: At,
@@ -137,7 +137,7 @@ impl SurfaceModel for EvolvingMap {
         here.kept::<Fitted>().errors(imager, &self.known)
     }
 
-    /// What has to be known of the field.
+    /// Remarks on the field.
     fn remarks(&self, _: &Imager, here: &Linearised) -> Vec<Remark> {
         SpotField::of(here.kept()).remarks()
     }

@@ -1,5 +1,5 @@
-//! What is left of an expansion for the orbit's velocities when systemic velocity and stellar parameters are integrated
-//! out within their priors, each taken as a Gaussian of the same mean and variance.
+//! The expansion in the orbit's velocities, marginalised over systemic velocity and stellar parameters within their
+//! priors, each represented by a Gaussian of the same mean and variance.
 
 use super::{Expansion, STELLAR};
 use crate::model::{FreeParameter, Parameter};
@@ -7,7 +7,7 @@ use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// A parameter that is integrated out, with the Gaussian that stands for its prior.
+/// A parameter that is marginalised over, with the Gaussian that represents its prior.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Nuisance {
     /// Systemic velocity, or one of [`STELLAR`].
@@ -28,25 +28,25 @@ pub fn nuisances(free: &[FreeParameter]) -> Vec<Nuisance> {
     free.iter().filter(|f| is_nuisance(f.parameter)).map(nuisance).collect()
 }
 
-/// Those that are no velocity: all but the systemic one.
+/// The nuisances that are not velocities: all but the systemic one.
 pub fn of_the_star(nuisances: &[Nuisance]) -> Vec<Nuisance> {
     nuisances.iter().copied().filter(|nuisance| nuisance.parameter != Parameter::Vsys).collect()
 }
 
 impl Expansion {
-    /// The quadratic in the velocities of the orbit alone, relative to the systemic velocity of the centre, with the
-    /// `nuisances` integrated out. Stellar ones must be among the coordinates.
+    /// The quadratic in the velocities of the orbit alone, relative to the systemic velocity of the centre,
+    /// marginalised over the `nuisances`. Stellar ones must be among the coordinates.
     pub fn velocities(&self, nuisances: &[Nuisance]) -> VelocityQuadratic {
         let (n, all) = (self.profiles(), self.centre.len());
         let columns = self.columns(nuisances);
         let (sd, offset) = self.priors(nuisances);
         let weight = sd.map(|sd| sd.powi(-2));
-        // at orbital velocities 0, all else as in the centre, a second planet too
+        // at orbital velocities 0, all else as in the centre, including a second planet
         let orbit = self.values.motion().first;
         let mut back = DVector::zeros(all);
         back.iter_mut().zip(&self.cycles).for_each(|(v, cycle)| *v = orbit.velocity_kms(*cycle));
         let gradient = &self.gradient + &self.information * &back;
-        // the answer of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P offset)
+        // the response of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P offset)
         let mut keep = DMatrix::zeros(n, all);
         keep.view_mut((0, 0), (n, n)).fill_with_identity();
         let mut pulled = DVector::zeros(n);
@@ -64,7 +64,7 @@ impl Expansion {
         }
     }
 
-    /// How each nuisance changes the coordinates, a column each.
+    /// Derivatives of the coordinates with each nuisance, one column each.
     pub(in crate::surface) fn columns(&self, nuisances: &[Nuisance]) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(self.centre.len(), nuisances.len());
         for (mut column, nuisance) in columns.column_iter_mut().zip(nuisances) {

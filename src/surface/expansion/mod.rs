@@ -1,9 +1,10 @@
-//! The regularised likelihood to second order around a reference, in the velocities of the profiles and in the star's
-//! own parameters (`docs/method.md` section 4).
+//! The regularised likelihood to second order around a reference, in the velocities of the profiles and in the stellar
+//! parameters (`docs/method.md` section 4).
 //!
 //! `ln L(x) = max_s [alpha S(s) - chi2(s, x)/2]` at the alpha of the reference is very nearly a quadratic in the
-//! velocity of every profile: it holds where the map that fits best answers the change of a velocity linearly. Its
-//! gradient and curvature take one preconditioned solve a profile. Evolving maps fill the same [`Expansion`] with ln Z.
+//! velocity of every profile: it is valid where the best-fitting map responds linearly to the change of a velocity. Its
+//! gradient and curvature take one preconditioned solve per profile. Evolving maps fill the same [`Expansion`] with ln
+//! Z.
 
 mod marginal;
 mod model;
@@ -20,21 +21,21 @@ use std::sync::LazyLock;
 pub use marginal::{Nuisance, nuisances, of_the_star};
 pub use model::{VELOCITY_STEP_KMS, stellar_step, velocity_slopes};
 
-/// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
+/// The stellar parameters that an expansion may contain beside the velocities, which include the systemic velocity.
 pub static STELLAR: LazyLock<Vec<Parameter>> =
     LazyLock::new(|| Parameter::ALL.into_iter().filter(|p| p.is_stellar()).collect());
 
-/// Those of the star's own parameters that are free.
+/// The free stellar parameters.
 pub fn free_stellar(free: &[FreeParameter]) -> Vec<Parameter> {
     STELLAR.iter().copied().filter(|p| free.iter().any(|f| f.parameter == *p)).collect()
 }
 
 /// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic
-/// velocity together), then the stellar parameters in the units of their names; those of the field in the coordinates
-/// that samplers move in ([`Parameter::to_sampling`]).
+/// velocity together), then the stellar parameters in the units of their names; those of the field in the sampling
+/// coordinates ([`Parameter::to_sampling`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expansion {
-    /// The parameters that it was made at.
+    /// The parameters of the expansion.
     pub values: ParameterValues,
     /// Rotation cycle of each profile.
     pub cycles: Vec<f64>,
@@ -48,12 +49,12 @@ pub struct Expansion {
     pub gradient: DVector<f64>,
     /// Minus the second derivative.
     pub information: DMatrix<f64>,
-    /// Covariance of the gradient that photon noise makes, and unresolved spots where they are counted as noise.
-    /// Otherwise it is smaller than the information, which counts spots that might be there as well.
+    /// Covariance of the gradient by photon noise, and by unresolved spots where they are counted as noise. Otherwise
+    /// it is smaller than the information, which also counts possible spots.
     pub noise: DMatrix<f64>,
 }
 
-/// Precision of the solves: the information is good to about this share of itself.
+/// Precision of the solves, and approximate relative precision of the information.
 const CG_TOLERANCE: f64 = 1e-4;
 
 impl Expansion {
@@ -74,7 +75,7 @@ impl Expansion {
             settings: SolverSettings { cg_tolerance: CG_TOLERANCE, ..SolverSettings::patient() },
         };
         let pulls: Vec<Vec<f64>> = (0..count).into_par_iter().map(|x| model.pull(x)).collect();
-        // M^-1 C_x, and the change of the model's depths that this change of the map makes
+        // M^-1 C_x, and the resulting change of the model's depths
         let answer = |pull: &Vec<f64>| {
             let mut problem = model.problem();
             let mut map = solver.apply_inverse(&mut problem, &reference.solution.image, pull);
@@ -88,7 +89,7 @@ impl Expansion {
         let mut information = model.curvature();
         for (x, pull) in pulls.iter().enumerate() {
             for (y, (map, _)) in answers.iter().enumerate() {
-                // both halves, so that what the solves leave undone is symmetric
+                // both halves, so that the remaining error of the solves is symmetric
                 let share = 0.5 * dot(pull, map);
                 information[(x, y)] -= share;
                 information[(y, x)] -= share;
@@ -122,7 +123,7 @@ impl Expansion {
         coordinates(values, &self.cycles, &self.stellar)
     }
 
-    /// How the coordinates change with the systemic velocity or one of the stellar parameters among them.
+    /// Derivatives of the coordinates with the systemic velocity or one of the stellar parameters among them.
     pub fn direction(&self, parameter: Parameter) -> DVector<f64> {
         let mut direction = DVector::zeros(self.centre.len());
         match self.stellar.iter().position(|&p| p == parameter) {

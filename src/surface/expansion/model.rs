@@ -1,6 +1,6 @@
 //! The forward model at a fixed map, displaced in one or two coordinates: its derivatives by central differences.
 //!
-//! A shift of all profiles at once gives every profile's own derivative, because no profile sees another's velocity.
+//! One shift of all profiles gives the derivative of each, because each profile depends only on its velocity.
 
 use crate::maxent::Problem;
 use crate::model::{Parameter, ParameterValues, Step, turning};
@@ -12,10 +12,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Step of the velocities (km/s): derivatives of a line are good to its square over that of the line's width.
+/// Step of the velocities (km/s): the relative error of derivatives of a line is the square of this over the line
+/// width.
 pub const VELOCITY_STEP_KMS: f64 = 0.02;
 
-/// Step of a stellar parameter: large enough that so many pixels come into sight at the limb that they do so smoothly.
+/// Step of a stellar parameter: large enough for a smooth change by the many pixels that come into sight at the limb.
 pub fn stellar_step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64 {
     match parameter.spec().difference {
         Step::Fixed(step) => step,
@@ -36,9 +37,10 @@ pub(super) struct DisplacedModel<'a> {
     here: ImagingProblem<'a>,
     /// All profiles shifted by a step up and down.
     shifted: [ImagingProblem<'a>; 2],
-    /// Each stellar parameter a step up and down.
+    /// Each stellar parameter displaced by a step up and down.
     turned: Vec<[ImagingProblem<'a>; 2]>,
-    /// What velocity zero points leave of the information on the velocity of each profile; empty where there are none.
+    /// The fraction of the information on the velocity of each profile that remains with the RV jitter; empty without a
+    /// jitter.
     left: Vec<f64>,
 }
 
@@ -70,13 +72,13 @@ impl<'a> DisplacedModel<'a> {
         model
     }
 
-    /// `1 - s^2 D'_k W D'_k`, that is `1 / (1 + s^2 E)` with E the information that the bins have on the velocity of a
-    /// profile beside all else.
+    /// `1 - s^2 D'_k W D'_k`, that is `1 / (1 + s^2 E)` with E the information of the bins on the velocity of a profile
+    /// beside all else.
     ///
-    /// A profile of the density `exp(g V - J V^2 / 2)` has, its zero point integrated out, `J / (1 + s^2 J)` in place
-    /// of J and `g / (1 + s^2 J)` in place of g. Weights with the slopes of one image make that of first derivatives.
-    /// Of second ones, which change J by a small `r W D''`, they make nothing, for the slopes do not follow the
-    /// velocity: so it is done here.
+    /// A profile with the density `exp(g V - J V^2 / 2)` has, marginalised over its RV jitter, `J / (1 + s^2 J)`
+    /// instead of J and `g / (1 + s^2 J)` instead of g. Weights with the slopes of one image do that for first
+    /// derivatives. For second ones, which change J by a small `r W D''`, they do not, because the slopes do not follow
+    /// the velocity: so it is done here.
     fn left_by_zero_points(&self) -> Vec<f64> {
         let sd = self.imager.data.nuisances.zero_point_kms();
         if sd == 0.0 {
@@ -108,7 +110,7 @@ impl<'a> DisplacedModel<'a> {
         displaced(self.imager, self.reference.response.clone(), &self.map)
     }
 
-    /// `C_x`: how coordinate `x` changes the gradient of chi2/2 with respect to the map.
+    /// `C_x`: the derivative with coordinate `x` of the gradient of chi2/2 with respect to the map.
     pub fn pull(&self, x: usize) -> Vec<f64> {
         let (pair, profiles, h) = match x.checked_sub(self.profiles()) {
             None => (&self.shifted, x..x + 1, VELOCITY_STEP_KMS),
@@ -130,7 +132,7 @@ impl<'a> DisplacedModel<'a> {
         pull
     }
 
-    /// `D_x` of every bin, a column a coordinate.
+    /// `D_x` of every bin, one column per coordinate.
     pub fn tangents(&self) -> DMatrix<f64> {
         let mut tangents = DMatrix::zeros(self.here.model().len(), self.profiles() + self.stellar.len());
         let velocity = first(&self.shifted, VELOCITY_STEP_KMS);

@@ -1,20 +1,20 @@
-//! The observed depths and the weights of their bins, which is all that the misfit needs of the observations.
+//! The observed depths and the weights of their bins: the input of the misfit.
 
 use crate::numerics::vector::Instructions;
 use crate::star::observation::Observations;
 use crate::surface::nuisances::Nuisances;
 use std::ops::Range;
 
-/// Data in the form that the misfit needs.
+/// Data in the form of the misfit.
 #[derive(Clone, Debug)]
 pub struct Data {
     /// Observed depth `1 - I` of every bin.
     pub depth: Vec<f64>,
     /// `1 / sigma^2` of every bin.
     pub inverse_variance: Vec<f64>,
-    /// Over how many bins their noise is correlated, which the errors allow for; 1 for white noise.
+    /// Number of bins over which their noise is correlated, included in the uncertainties; 1 for white noise.
     pub correlated_bins: f64,
-    /// What may be wrong with each profile by itself, integrated out.
+    /// Errors of each profile by itself, marginalised over.
     pub nuisances: Nuisances,
 }
 
@@ -30,7 +30,7 @@ impl Data {
         }
     }
 
-    /// That of the profiles with these `bins` alone.
+    /// The data of the profiles with these `bins` alone.
     pub fn of_profiles(&self, profiles: &[Range<usize>]) -> Self {
         let of = |x: &[f64]| profiles.iter().flat_map(|bins| x[bins.clone()].to_vec()).collect::<Vec<f64>>();
         let inverse_variance = of(&self.inverse_variance);
@@ -39,7 +39,7 @@ impl Data {
         Data { depth: of(&self.depth), inverse_variance, correlated_bins: self.correlated_bins, nuisances }
     }
 
-    /// The same with errors of each profile, which has these `bins`, times its factor.
+    /// The same with the uncertainties of each profile, which has these `bins`, times its factor.
     pub fn with_larger_errors(&self, profiles: &[Range<usize>], factors: &[f64]) -> Self {
         let mut larger = self.clone();
         for (bins, factor) in profiles.iter().zip(factors) {
@@ -48,8 +48,8 @@ impl Data {
         larger.of_profiles(profiles)
     }
 
-    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see
-    /// another's bins.
+    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: each profile's weights involve
+    /// only its bins.
     #[inline(always)]
     pub fn weigh(&self, i: impl Instructions, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
         let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);

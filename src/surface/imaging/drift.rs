@@ -1,14 +1,14 @@
 //! A drift of the velocities: a polynomial in time with Gaussian priors, around the slope at which it is held.
 
-/// Standard deviation of the prior: of the velocity (km/s) at the end of the data over that in the middle, and of the
-/// slope (km/s/d) where that is less. No spectrograph and no companion on a long orbit drifts faster, and a planet is
-/// not to be taken for a drift within one or two nights.
+/// Standard deviation of the prior: of the velocity (km/s) at the end of the data relative to the middle, and of the
+/// slope (km/s/d) where that is less. No spectrograph and no companion on a long orbit drifts faster, and a drift
+/// should not absorb a planet within one or two nights.
 const PRIOR: (f64, f64) = (0.5, 0.1);
 
-/// A drift of some of the profiles; time counts from their middle.
+/// A drift of some of the profiles; time is relative to their middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// The data set, where its offset is fitted; otherwise it is that of all profiles whose offsets are known.
+    /// The data set, where its offset is fitted; otherwise it applies to all profiles whose offsets are known.
     pub set: Option<usize>,
     /// Whether there is a curvature beside the slope.
     pub(super) curved: bool,
@@ -16,12 +16,12 @@ pub struct Drift {
     pub(super) mid_d: f64,
     /// Half of their span (d).
     pub half_span_d: f64,
-    /// The slope with which profiles are imaged (km/s/d); its prior lies around 0.
+    /// The slope with which profiles are imaged (km/s/d); its prior is centred on 0.
     pub held_kms_d: f64,
 }
 
 impl Drift {
-    /// Of profiles at these times (d), held at 0; `None` where they have no span.
+    /// A drift of profiles at these times (d), held at 0; `None` where they have no span.
     pub(super) fn over(times_d: impl Iterator<Item = f64>, curved: bool) -> Option<Self> {
         let ends = times_d.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
         let (mid_d, half_span_d) = (0.5 * (ends.0 + ends.1), 0.5 * (ends.1 - ends.0));
@@ -34,7 +34,7 @@ impl Drift {
         if self.curved { 2 } else { 1 }
     }
 
-    /// Mean of the prior of a term, from where it is held (km/s).
+    /// Mean of the prior of a term, relative to where it is held (km/s).
     pub(super) fn mean_kms(&self, term: usize) -> f64 {
         if term == 0 { -self.held_kms_d * self.half_span_d } else { 0.0 }
     }

@@ -1,5 +1,5 @@
-//! The misfit of maps to profiles through one response, with its gradient and curvature: the problem that the solver of
-//! maximum entropy is given.
+//! The misfit of maps to profiles through one response, with its gradient and curvature: the problem for the
+//! maximum-entropy solver.
 
 use super::Data;
 use super::profile::{Bend, Misfit, Pull};
@@ -23,7 +23,7 @@ pub struct ImagingProblem<'a> {
     continuum: Vec<f64>,
     brightness: Vec<f64>,
     bins: Vec<f64>,
-    /// Residuals or changes of the model, before they are weighed.
+    /// Residuals or changes of the model, before weighting.
     differences: Vec<f64>,
     constants: Vec<f64>,
 }
@@ -36,8 +36,8 @@ impl<'a> ImagingProblem<'a> {
         ImagingProblem::of_brightness(area, data, response, brightness)
     }
 
-    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of one map or several, which
-    /// give the brightness as each profile sees it.
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, with one map or several, which
+    /// give the brightness for each profile.
     pub(super) fn of_brightness(
         area: &'a [f64],
         data: &'a Data,
@@ -62,7 +62,7 @@ impl<'a> ImagingProblem<'a> {
         }
     }
 
-    /// How many of its model applications were in single precision.
+    /// Number of its model applications in single precision.
     pub fn single_applications(&self) -> u32 {
         self.single_applications
     }
@@ -72,22 +72,22 @@ impl<'a> ImagingProblem<'a> {
         &self.model
     }
 
-    /// Weights times what the model is above the data, at the current map.
+    /// Weights times model minus data, at the current map.
     pub fn weighted_residual(&self) -> &[f64] {
         &self.weighted_residual
     }
 
-    /// The response that the problem was made with.
+    /// The response of the problem.
     pub fn response(&self) -> &Response {
         &self.response
     }
 
-    /// Gradient of the part of chi2 / 2 that the given profiles make, with respect to the map, at the current map.
+    /// Gradient of the contribution of the given profiles to chi2 / 2, with respect to the map, at the current map.
     pub fn gradient_of(&self, profiles: std::ops::Range<usize>, out: &mut [f64]) {
         self.pulled(profiles, &self.weighted_residual, out);
     }
 
-    /// `J^T x` of what stands in the bins of the given profiles, J the derivative of the model with respect to the map.
+    /// `J^T x` for the bins of the given profiles, J the derivative of the model with respect to the map.
     pub fn pulled(&self, profiles: std::ops::Range<usize>, x: &[f64], out: &mut [f64]) {
         let (mut bins, mut constants) = (vec![0.0; self.bins.len()], vec![0.0; self.constants.len()]);
         for k in profiles {
@@ -96,7 +96,7 @@ impl<'a> ImagingProblem<'a> {
         self.response.apply_transpose(&bins, &constants, out);
     }
 
-    /// What profile `k` hands to the transpose for such a residual: its bins, and the constant that comes with them.
+    /// The input of the transpose from profile `k` for such a residual: its bins, and the constant for its continuum.
     fn pull(&self, k: usize, weighted_residual: &[f64], back: &mut [f64]) -> f64 {
         let (bins, scale) = (self.response.bins(k), self.brightness_of[k].slope / self.continuum[k]);
         let (model, weighted_residual) = (&self.model[bins.clone()], &weighted_residual[bins.clone()]);

@@ -1,19 +1,19 @@
-//! One observed profile, once the response has made a line and a continuum of a map: its misfit, and what goes back
-//! through the response for gradient and curvature of chi2 / 2.
+//! One observed profile, given line and continuum of a map from the response: its misfit, and the input of the
+//! transposed response for gradient and curvature of chi2 / 2.
 //!
-//! Vectors are as long as the data, of which a profile has some bins.
+//! Vectors have the length of the data; a profile uses some of the bins.
 
 use super::data::Data;
 use crate::numerics::vector::linear::short_dot;
 use crate::numerics::vector::{Instructions, Task};
 use std::ops::Range;
 
-/// The model depth `D = line / continuum` and its weighted residual; chi2 of the profile comes out.
+/// Computes the model depth `D = line / continuum` and its weighted residual; returns chi2 of the profile.
 pub struct Misfit<'a> {
     pub data: &'a Data,
     pub bins: Range<usize>,
     pub continuum: f64,
-    /// Line at first, depth at last.
+    /// The line on input, the depth on output.
     pub model: &'a mut [f64],
     pub differences: &'a mut [f64],
     pub weighted_residual: &'a mut [f64],
@@ -35,7 +35,7 @@ impl Task for Misfit<'_> {
     }
 }
 
-/// What the transpose makes the gradient of: the profile's `back`, and the continuum that comes out.
+/// Computes the input of the transpose for the gradient: the profile's `back`; returns that of the continuum.
 pub struct Pull<'a> {
     /// Slope of the brightness over the continuum.
     pub scale: f64,
@@ -55,24 +55,24 @@ impl Task for Pull<'_> {
     }
 }
 
-/// What the transpose makes the curvature of, `J^T W J v` plus that of the model: with `dD = (line(dB) - D dC) / C`,
-/// the second derivative of `D = N/C` in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`. The continuum comes
-/// out.
+/// Computes the input of the transpose for the curvature, `J^T W J v` plus that of the model: with `dD = (line(dB) - D
+/// dC) / C`, the second derivative of `D = N/C` in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`. Returns
+/// that of the continuum.
 pub struct Bend<'a> {
     pub data: &'a Data,
     pub bins: Range<usize>,
     /// Slope of the brightness over the continuum.
     pub scale: f64,
-    /// Whether the model's curvature is wanted.
+    /// Whether the model's curvature is included.
     pub exact: bool,
     /// At the current map.
     pub model: &'a [f64],
     pub weighted_residual: &'a [f64],
     pub differences: &'a mut [f64],
     pub weighed: &'a mut [f64],
-    /// Of the change of the map.
+    /// Continuum of the change of the map.
     pub d_continuum: f64,
-    /// The profile's line of the change of the map at first, what goes back at last.
+    /// The profile's line of the change of the map on input, the input of the transpose on output.
     pub line: &'a mut [f64],
 }
 

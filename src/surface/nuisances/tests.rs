@@ -1,4 +1,4 @@
-//! The weights against a dense inverse, and their limits.
+//! The weights compared with a dense inverse, and their limits.
 
 use super::*;
 use crate::numerics::vector::Portable;
@@ -16,12 +16,12 @@ fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
     }
 }
 
-/// Two profiles whose bins stand between each other's.
+/// Two profiles whose bins are offset from each other.
 fn observations() -> Observations {
     Observations { profiles: vec![profile(-20.0, 0.0), profile(-17.3, 1.0)] }
 }
 
-/// Dense weights of profile `k`: what they make of every unit vector.
+/// Dense weights of profile `k`: the results for all unit vectors.
 fn dense(nuisances: &Nuisances, k: usize, power: i32, root: bool) -> DMatrix<f64> {
     let (observations, bins) = (observations(), 20 * k..20 * k + 20);
     let mut matrix = DMatrix::zeros(20, 20);
@@ -70,7 +70,7 @@ fn wide_priors_project_the_templates_out() {
         let weights = dense(&nuisances, k, 2, false);
         let rows = templates_of(&observations.profiles[k], &observations);
         for template in [0, 1, 2].map(|i| DVector::from_iterator(20, rows.iter().map(|row| row[i]))) {
-            // what is left is the prior's: 1/100 where the data say 1e6
+            // the remaining information is the prior's: 1/100 where the data have 1e6
             assert!((&weights * &template).dot(&template) < 0.02);
         }
         let trace = (covariance(LineAndContinuum::default(), k) * weights).trace();

@@ -1,10 +1,10 @@
-//! Measurements of a light curve that no spot explains: single ones far from their neighbours, and flares.
+//! Measurements of a light curve that no spots explain: single outliers, and flares.
 //!
-//! Spots change the flux within a good part of a rotation. Each measurement is compared with a parabola through those
-//! of a twelfth of a rotation before and after it, which a minority of wild ones does not move (least absolute
-//! deviations), in units of its error or of the scatter around the parabolas, whichever is larger. Parabolas are fitted
-//! again without what was found, until nothing changes. A dip of several measurements may be a transit: it is told of,
-//! and kept.
+//! Spots change the flux on the time scale of a rotation. Each measurement is compared with a parabola through those of
+//! a twelfth of a rotation before and after it, robust against a minority of outliers (least absolute deviations), in
+//! units of its uncertainty or of the scatter around the parabolas, whichever is larger. Parabolas are fitted again
+//! without the outliers, until nothing changes. A dip of several measurements may be a transit: it is reported, and
+//! kept.
 
 use super::{Flux, segments};
 use nalgebra::{Matrix3, Vector3};
@@ -13,57 +13,57 @@ use std::ops::Range;
 /// Half of the window of a parabola, in rotations.
 const HALF_WINDOW: f64 = 1.0 / 12.0;
 
-/// Parabolas a window: each serves the measurements around its middle.
+/// Parabolas per window: each serves the measurements around its middle.
 const CELLS: f64 = 4.0;
 
-/// Factors on a window that has too few measurements.
+/// Factors on a window with too few measurements.
 const WIDER: [f64; 3] = [1.0, 1.5, 2.0];
 
-/// Fewest measurements that a parabola needs to tell which of them is wild,
+/// Fewest measurements for a parabola to identify outliers,
 const FEWEST: usize = 7;
 
-/// and those on each side, where any lie there: it is not to be trusted beyond them.
+/// and on each side, where any lie there: it is unreliable beyond them.
 const EACH_SIDE: usize = 3;
 
-/// A measurement so many standard deviations away is wild.
+/// A measurement so many standard deviations away is an outlier.
 const WILD: f64 = 5.0;
 
-/// Those beside one that is wild and bright belong to the same flare as long as they are that far up,
+/// Those beside a bright outlier belong to the same flare while they exceed this,
 const FLARE: f64 = 2.0;
 
-/// and those beside one that is wild and faint to the same dip as long as they are that far down.
+/// and those beside a faint outlier to the same dip while they are at least this far below.
 const DIP: f64 = 3.0;
 
 /// A dip of more measurements than this is kept,
 const LONGEST_DIP: usize = 2;
 
-/// unless it takes away more than this share of the flux, which neither spots nor planets do.
+/// unless it reduces the flux by more than this fraction, which neither spots nor planets do.
 const DEEPEST: f64 = 0.5;
 
-/// By this share of what spots change in the flux a parabola may be wrong, for [`WILD`] standard deviations; in a wider
-/// window more so, by the third power of the factor.
+/// Error of a parabola as a fraction of the changes of the flux by spots, for [`WILD`] standard deviations; in a wider
+/// window it grows with the third power of the factor.
 const OF_SPOTS: f64 = 0.02;
 
-/// Where neighbours are too few, a measurement farther than this share of the median flux from it is wild.
+/// Where neighbours are too few, a measurement farther than this fraction of the median flux from it is an outlier.
 const ALONE: f64 = 0.3;
 
-/// Rounds of parabolas without what was wild.
+/// Iterations of parabolas without the outliers.
 const ROUNDS: usize = 10;
 
-/// Steps of the least absolute deviations.
+/// Iterations of the least absolute deviations.
 const STEPS: usize = 25;
 
-/// What is wild in a light curve.
+/// The outliers of a light curve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outliers {
-    /// Which measurements are, in the order of time, each with the flux that its neighbours let expect.
+    /// Indices of the outliers, in the order of time, each with the flux predicted from its neighbours.
     pub wild: Vec<(usize, f64)>,
     /// Dips that are kept.
     pub dips: Vec<Range<usize>>,
 }
 
 /// The outliers among measurements in the order of time, of a star with this rotation period (d), whose segments are
-/// parted by gaps of more than `gap_d` (d).
+/// separated by gaps of more than `gap_d` (d).
 pub fn outliers(measured: &[Flux], rotation_period_d: f64, gap_d: f64) -> Outliers {
     let mut all = Outliers::default();
     let mut first = 0;
@@ -82,19 +82,19 @@ struct Segment<'a> {
     rotation_period_d: f64,
 }
 
-/// What its neighbours say of a measurement.
+/// A measurement compared with its neighbours.
 #[derive(Clone, Copy)]
 struct Judged {
-    /// Flux that they let expect.
+    /// Flux predicted from them.
     expected: f64,
-    /// How far above it is, in standard deviations.
+    /// Height above that, in standard deviations.
     above: f64,
 }
 
 impl Segment<'_> {
     fn outliers(&self) -> Outliers {
         let mut found = Outliers::default();
-        // neither what is wild nor dips say what the flux is beside them
+        // neither outliers nor dips are used for predictions beside them
         let mut trusted = vec![true; self.measured.len()];
         let mut judged = Vec::new();
         for _ in 0..ROUNDS {
@@ -102,7 +102,7 @@ impl Segment<'_> {
             found = self.told(&judged);
             let mut now = vec![true; self.measured.len()];
             for flare in found.wild.chunk_by(|a, b| a.0 + 1 == b.0) {
-                // nor does the tail of a flare, which takes as long as what is seen of it
+                // nor is the tail of a flare, which is assumed to last as long as its detected part
                 let tail = if flare.len() > LONGEST_DIP { flare.len() } else { 0 };
                 let (first, last) = (flare[0].0, flare[flare.len() - 1].0 + tail);
                 now[first..=last.min(self.measured.len() - 1)].fill(false);
@@ -116,7 +116,7 @@ impl Segment<'_> {
         found
     }
 
-    /// What the trusted measurements say of each; where they say nothing, what was said `before`.
+    /// Comparison of each with the trusted measurements; where these are too few, as `before`.
     fn judged(&self, trusted: &[bool], before: &[Judged]) -> Vec<Judged> {
         let cells = self.cells();
         let parabolas: Vec<Option<Parabola>> = cells.iter().map(|cell| self.parabola(cell, trusted)).collect();
@@ -158,7 +158,7 @@ impl Segment<'_> {
         super::cells(self.measured, width_d).map(of_cell).collect()
     }
 
-    /// The measurements of some time (d), and their numbers.
+    /// The measurements between two times (d), as indices.
     fn within(&self, [first_d, last_d]: [f64; 2]) -> Range<usize> {
         let before = |time_d: f64| self.measured.partition_point(|one| one.time_d < time_d);
         before(first_d)..self.measured.partition_point(|one| one.time_d <= last_d)
@@ -195,7 +195,7 @@ impl Segment<'_> {
         off.get(off.len() / 2).map_or(1.0, |median| (OF_MEDIAN * median).max(1.0))
     }
 
-    /// Median of what is trusted, and how far 5 and 95 % of it are apart.
+    /// Median of the trusted ones, and the distance between their 5 and 95 % quantiles.
     fn spread(&self, trusted: &[bool]) -> Spread {
         let kept = self.measured.iter().zip(trusted).filter(|(_, trusted)| **trusted);
         let mut fluxes: Vec<f64> = kept.map(|(one, _)| one.flux).collect();
@@ -204,7 +204,7 @@ impl Segment<'_> {
         Spread { median: at(0.5), width: at(0.95) - at(0.05) }
     }
 
-    /// What is wild of measurements that were judged, and dips that may be transits.
+    /// The outliers among compared measurements, and dips that may be transits.
     fn told(&self, judged: &[Judged]) -> Outliers {
         let mut found = Outliers::default();
         let sign = |one: &Judged| match one.above {
@@ -252,14 +252,14 @@ struct Parabola {
 }
 
 impl Parabola {
-    /// That of the least absolute deviations, in units of the errors: least squares of weights that fall with the
+    /// Least absolute deviations, in units of the uncertainties: least squares with weights that fall with the
     /// distance.
     fn through(around: &[&Flux], middle_d: f64, half_d: f64, wider: f64) -> Option<Self> {
         let powers = |one: &Flux| {
             let x = (one.time_d - middle_d) / half_d;
             Vector3::new(1.0, x, x * x)
         };
-        // away from the middle, so that sums of large fluxes lose nothing
+        // relative to one of them, so that sums of large fluxes lose no precision
         let from = around[0].flux;
         let mut coefficients = Vector3::zeros();
         for step in 0..STEPS {
@@ -267,7 +267,7 @@ impl Parabola {
             for one in around {
                 let powers = powers(one);
                 let off = ((one.flux - from - powers.dot(&coefficients)) / one.sigma).abs();
-                /// Deviations below this part of an error are none.
+                /// Deviations below this fraction of an uncertainty count as zero.
                 const NONE: f64 = 0.05;
                 let weight = if step == 0 { 1.0 } else { off.max(NONE).recip() } / (one.sigma * one.sigma);
                 normal += weight * powers * powers.transpose();
@@ -293,7 +293,7 @@ mod tests {
     const PERIOD_D: f64 = 3.0;
     const SIGMA: f64 = 3e-4;
 
-    /// A spotted star for twelve days, with noise, and what is added to its flux.
+    /// A spotted star for twelve days, with noise, and an addition to its flux.
     fn seen(cadence_d: f64, added: impl Fn(f64) -> f64) -> Vec<Flux> {
         let mut state = 1u64;
         let mut uniform = || {
@@ -319,12 +319,12 @@ mod tests {
         for cadence_d in [0.002, 0.02, 0.05, 0.1, 0.3, 1.0] {
             let mut measured = seen(cadence_d, |_| 0.0);
             assert_eq!(outliers(&measured, PERIOD_D, 3.0), Outliers::default(), "every {cadence_d} d");
-            // nor with a gap of a day and errors that are three times too small
+            // nor with a gap of a day and uncertainties that are three times too small
             measured.retain(|one| !(2_459_004.0..2_459_005.0).contains(&one.time_d));
             measured.iter_mut().for_each(|one| one.sigma /= 3.0);
             assert_eq!(outliers(&measured, PERIOD_D, 3.0), Outliers::default(), "every {cadence_d} d");
         }
-        // nor where it pulsates
+        // nor for a pulsating star
         let pulsating = seen(0.02, |t| 30.0 * SIGMA * (TAU * t / 0.13).sin());
         assert_eq!(outliers(&pulsating, PERIOD_D, 3.0), Outliers::default());
     }
@@ -365,7 +365,7 @@ mod tests {
             let measured = seen(0.02, flare);
             let found = wild(&measured);
             let above = |k: usize| flare(measured[k].time_d - 2_459_000.5);
-            // all that is well above the noise, and not much else
+            // everything well above the noise, and little else
             assert!((0..measured.len()).all(|k| above(k) < 10.0 * SIGMA || found.contains(&k)), "{height}: {found:?}");
             assert!(found.iter().all(|k| above(*k) > 0.2 * SIGMA), "{height}: {found:?}");
         }

@@ -1,17 +1,17 @@
-//! What a posterior becomes where the spots that the map leaves over are counted as noise, their size unknown.
+//! The posterior where residual unresolved spots are counted as noise of unknown size.
 //!
 //! With x the coordinates of an expansion relative to its centre, its gradient g there scatters around `I x` with the
 //! covariance `S = noise + f (I - noise)`, f the size of unresolved spots in variance (`spots`). Close to the rotation
-//! period, an orbit can stand for unresolved spots and they for an orbit: which of them it is is not settled by the
-//! size that is most probable with one or the other, so that the size is integrated over, uniform in its logarithm:
-//! `p(x) = sum_f |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
+//! period, an orbit can mimic unresolved spots and they an orbit: the most probable size with one or the other does not
+//! distinguish them, so that the posterior is marginalised over the size, uniform in its logarithm: `p(x) = sum_f
+//! |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
 //!
-//! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. A map answers
-//! a large change of the velocities as q says that it would a smaller one in the same direction (or a larger one): in
-//! place of x stands `c x` with `q(c x) = ln L`, on the same side of the highest q in that direction. Next to that
-//! height, where c would jump, it is softened, and of the rest every term has the share `rho_f = x I S_f^-1 I x / x I
-//! x`, at most 1, that unresolved spots leave of what q does along x. So nothing is better than what explains all
-//! velocities but for the rest, and with spots of the entropy's own size ln L comes back as it is.
+//! ln L by the objective exceeds the quadratic q, increasingly with the distance from the reference. A map responds to
+//! a large change of the velocities as q predicts for a smaller (or larger) one in the same direction: x is replaced by
+//! `c x` with `q(c x) = ln L`, on the same side of the maximum of q in that direction. Near that maximum, where c would
+//! jump, it is softened, and every term gets the fraction `rho_f = x I S_f^-1 I x / x I x`, at most 1, of the rest: the
+//! part of the effect of q along x that unresolved spots leave. So nothing exceeds the likelihood of explaining all
+//! velocities apart from the rest, and with spots of the entropy's size ln L is unchanged.
 
 use super::spots::UNRESOLVED_SPOTS;
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
@@ -21,16 +21,16 @@ use crate::surface::expansion::{Expansion, free_stellar, nuisances};
 use crate::surface::static_map::Posterior;
 use nalgebra::{DMatrix, DVector};
 
-/// Differences of ln L below this are next to nothing.
+/// Differences of ln L below this are negligible.
 const SOFT: f64 = 1.0;
 
-/// Sizes that are integrated over, for each factor of ten.
+/// Sizes in the marginalisation, per factor of ten.
 const SIZES_PER_DECADE: f64 = 4.0;
 
-/// What a posterior becomes where unresolved spots count as noise.
+/// The posterior with unresolved spots counted as noise.
 #[derive(Clone, Debug)]
 pub struct SpotsCounted {
-    /// ln L as the objective has it at the reference, and the density of the gradient there, ln of it.
+    /// ln L by the objective at the reference, and ln of the density of the gradient there.
     at_reference: f64,
     density_at_reference: f64,
     entropy: Expansion,
@@ -48,14 +48,14 @@ struct Size {
 }
 
 impl SpotsCounted {
-    /// Of `posterior`, to second order around its reference; `None` where there is no such size.
+    /// For `posterior`, to second order around its reference; `None` where there is no such size.
     pub fn new(posterior: &Posterior) -> Option<Self> {
         let free = posterior.space().free();
         let reference = posterior.reference();
         let entropy = Expansion::of(posterior.imager(), reference, &free_stellar(free));
         let mut without_planet = reference.values;
         without_planet.set(Parameter::K, 0.0);
-        // an orbit that stands for unresolved spots makes them look small
+        // an orbit that mimics unresolved spots makes them look small
         let size = [reference.values, without_planet]
             .iter()
             .filter_map(|values| entropy.recentred(values).unresolved_spots(&nuisances(free)))
@@ -77,19 +77,19 @@ impl SpotsCounted {
     }
 
     /// ln L at the reference to second order, with unresolved spots of the larger of the sizes that are most probable
-    /// with the reference's orbit and without a planet: what a surrogate is made of.
+    /// with the reference's orbit and without a planet: the basis of a surrogate.
     pub fn expansion(&self) -> &Expansion {
         &self.cautious
     }
 
-    /// ln L with unresolved spots counted, where it is `log_likelihood` with spots as the entropy has them.
+    /// ln L with unresolved spots counted, where it is `log_likelihood` with spots of the entropy's size.
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
         let step = self.entropy.coordinates(values) - &self.entropy.centre;
         let (answer, rest) = self.answer(&step, log_likelihood - self.at_reference);
         self.at_reference + self.ln_density(&step, answer, rest) - self.density_at_reference
     }
 
-    /// How many times `step` the map answers where ln L changes by `change`, and what is left of the change.
+    /// The multiple of `step` to which the map responds where ln L changes by `change`, and the rest of the change.
     fn answer(&self, step: &DVector<f64>, change: f64) -> (f64, f64) {
         let whole = step.dot(&(&self.entropy.information * step));
         let along = self.entropy.gradient.dot(step);
@@ -97,7 +97,7 @@ impl SpotsCounted {
         if whole <= 0.0 {
             return (1.0, change - quadratic(1.0));
         }
-        // where the quadratic is highest along the step, and how far below that height it and ln L are
+        // where the quadratic is highest along the step, and how far it and ln L are below that maximum
         let top = along / whole;
         let height = 0.5 * along * top;
         let (of_quadratic, of_change) = (0.5 * whole * (1.0 - top).powi(2), (height - change).max(0.0));
@@ -106,7 +106,7 @@ impl SpotsCounted {
         (times, change - quadratic(times))
     }
 
-    /// ln of the density of the gradient, the size integrated over, at so many `times` the step, and the `rest`.
+    /// ln of the density of the gradient, marginalised over the size, at so many `times` the step, and the `rest`.
     fn ln_density(&self, step: &DVector<f64>, times: f64, rest: f64) -> f64 {
         let whole = step.dot(&(&self.entropy.information * step));
         let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step, times, whole, rest)).collect();
@@ -129,7 +129,7 @@ impl SpotsCounted {
 }
 
 impl Size {
-    /// Of unresolved spots `factor` times as large in variance as the entropy expects; `None` where that is no
+    /// For unresolved spots `factor` times as large in variance as the entropy expects; `None` where that is no
     /// covariance.
     fn new(expansion: &Expansion, factor: f64) -> Option<Self> {
         let lower = expansion.covariance_with_unresolved_spots(factor).cholesky()?.unpack();
@@ -140,11 +140,11 @@ impl Size {
         })
     }
 
-    /// `whole` is what the entropy's information makes of the step.
+    /// `whole` is the step weighted by the entropy's information.
     fn ln_density(&self, step: &DVector<f64>, times: f64, whole: f64, rest: f64) -> f64 {
         let moved = &self.information * step;
         let left = moved.norm_squared();
-        // rounding may make more of it than there is
+        // rounding may make it too large
         let share = if left < whole { left / whole } else { 1.0 };
         self.ln_norm - 0.5 * (&self.gradient - times * moved).norm_squared() + share * rest
     }
@@ -184,7 +184,7 @@ mod tests {
         })
     }
 
-    /// Where a map answers as it would a step of that many times the length, spots counted or not.
+    /// Where a map responds as to a step of that many times the length, spots counted or not.
     #[test]
     fn a_map_that_answers_less_is_a_smaller_step() {
         let counted = spotted();
@@ -196,7 +196,7 @@ mod tests {
                 let change = counted.entropy.gradient.dot(&smaller)
                     - 0.5 * smaller.dot(&(&counted.entropy.information * &smaller));
                 let top = counted.entropy.gradient.dot(&step) / step.dot(&(&counted.entropy.information * &step));
-                // beyond the height in its direction on one side only, and by much more than SOFT
+                // beyond the maximum in its direction on one side only, and by much more than SOFT
                 if (times - top) * (1.0 - top) <= 0.0 || 0.5 * (times - top).powi(2) * step.norm_squared() < 50.0 {
                     continue;
                 }
@@ -223,15 +223,15 @@ mod tests {
         }
     }
 
-    /// Where ln L is a little off the quadratic, that changes it little: also where the quadratic is highest along the
-    /// step.
+    /// Where ln L differs slightly from the quadratic, the density changes slightly: also where the quadratic is
+    /// highest along the step.
     #[test]
     fn nothing_is_magnified() {
         let counted = spotted();
         for mut values in orbits() {
             let step = counted.entropy.coordinates(&values);
             let top = counted.entropy.gradient.dot(&step) / step.dot(&(&counted.entropy.information * &step));
-            // at the height, and a little before and beyond it
+            // at the maximum, and slightly before and beyond it
             for part in [0.98, 1.0, 1.02] {
                 if top > 0.0 {
                     values.set(Parameter::K, values[Parameter::K] * (part * top));

@@ -83,7 +83,7 @@ impl SurfaceDensity for Posterior {
     }
 }
 
-/// The same with the spots that the map does not resolve counted as noise.
+/// The same with unresolved spots counted as noise.
 #[derive(Clone, Debug)]
 struct Counted {
     posterior: Posterior,
@@ -169,7 +169,7 @@ impl SurfaceDensity for Counted {
 }
 
 impl Posterior {
-    /// The posterior of one map behind a density; `None` where there is another behind it.
+    /// The posterior of one map behind a density; `None` where it is another one.
     pub fn behind(density: &dyn SurfaceDensity) -> Option<&Self> {
         density.any().downcast_ref()
     }

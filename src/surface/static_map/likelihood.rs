@@ -1,7 +1,6 @@
-//! What a reconstruction is worth: ln L by the three objectives (`docs/method.md` section 3, step 3), whatever the
-//! prior says.
+//! ln L of a reconstruction by the three objectives (`docs/method.md` section 3, step 3), without the prior.
 //!
-//! In the posterior it is joined by the prior; alone it is what a landscape shows.
+//! The posterior adds the prior; a likelihood grid shows ln L alone.
 
 use super::posterior::{CHI2, Posterior, SPOTTEDNESS};
 use super::tradeoff::Measure;
@@ -12,11 +11,11 @@ use crate::surface::objective::ObjectiveKind;
 /// A chi2 this many times the target is far from any fit.
 const FAR: f64 = 1.05;
 
-/// Names of the numbers beside ln L.
+/// Names of the values beside ln L.
 pub const NUMBERS: [&str; 4] = [SPOTTEDNESS, "entropy", CHI2, "lambda"];
 
 impl Posterior {
-    /// ln L at `theta` (physical coordinates), with [`NUMBERS`] beside it. The log-probability there is that plus the
+    /// ln L at `theta` (physical coordinates), with the values [`NUMBERS`]. The log-probability there is that plus the
     /// logarithm of the prior.
     pub fn likelihood(&self, theta: &[f64]) -> Evaluation {
         if !self.is_physical(theta) {
@@ -27,7 +26,7 @@ impl Posterior {
         self.judged(&solution, numbers.to_vec(), problem.model_applications())
     }
 
-    /// ln L of a reconstruction of so many model applications, with `numbers` beside it.
+    /// ln L of a reconstruction with so many model applications, with the values `numbers`.
     pub(super) fn judged(&self, solution: &Solution, numbers: Vec<f64>, model_applications: u32) -> Evaluation {
         match self.judge(solution) {
             Ok((log_likelihood, status)) => {
@@ -48,7 +47,7 @@ impl Posterior {
             ObjectiveKind::Entropy => Measure::NegativeEntropy,
         };
         let target = self.reference().chi2_target;
-        // where the target is out of reach, its misfit counts as it is
+        // where the target is out of reach, its misfit counts
         let (to_target, misfit) = match solution.termination {
             Termination::Converged => (target - solution.chi2, 0.0),
             _ => (0.0, solution.chi2 - target),
@@ -61,8 +60,8 @@ impl Posterior {
         (-0.5 * (target - on_curve + misfit), slope)
     }
 
-    /// Spottedness of a reconstruction; at the target chi2 what a first-order forecast says that the solver's next
-    /// steps would make of it (along the path alone where spottedness is not the objective).
+    /// Spottedness of a reconstruction; at the target chi2 a first-order forecast of the solver's next steps (along the
+    /// path alone where spottedness is not the objective).
     pub(super) fn spottedness(&self, solution: &Solution) -> f64 {
         match (self.goal(), solution.termination) {
             (Goal::Chi2 { target, .. }, Termination::Converged) => {
@@ -73,7 +72,7 @@ impl Posterior {
         }
     }
 
-    /// ln L of a reconstruction and how it ended, or the status of its failure.
+    /// ln L of a reconstruction and its status, or the status of its failure.
     fn judge(&self, solution: &Solution) -> Result<(f64, Status), Status> {
         let status = match solution.termination {
             Termination::Converged => Status::Converged,
@@ -81,7 +80,7 @@ impl Posterior {
             Termination::StepLimit if solution.chi2 < FAR * self.reference().chi2_target => {
                 return Err(Status::StoppedShort);
             }
-            // a lower bound of the log-probability, good enough where it is hundreds below the best
+            // a lower bound of the log-probability, sufficient where it is hundreds below the best
             Termination::StepLimit => Status::Unreachable,
             Termination::NonFinite => return Err(Status::NonFinite),
         };

@@ -1,4 +1,4 @@
-//! The map of maximum entropy held against the data.
+//! The map of maximum entropy compared with the data.
 
 use super::Reference;
 use crate::maxent::entropy::Entropy;
@@ -13,7 +13,7 @@ use crate::surface::maps::{
 use crate::surface::nuisances::Estimate;
 
 impl Deviation {
-    /// Of a map of brightnesses; `None` if maps hold something else.
+    /// For a map of brightnesses; `None` if maps have other values.
     fn of(imager: &Imager, map: &[f64]) -> Option<Self> {
         let mean = |part: fn(f64) -> f64| map.iter().zip(&imager.areas).map(|(b, a)| a * part(b - 1.0)).sum();
         match imager.entropy {
@@ -26,7 +26,7 @@ impl Deviation {
 }
 
 impl SurfaceMaps {
-    /// Holds the image of `reference` against the `observations` that `imager` was made for.
+    /// Compares the image of `reference` with the `observations` that `imager` was made for.
     #[doc(hidden)]
     pub fn of_reference(imager: &Imager, observations: &Observations, reference: &Reference) -> Self {
         let solution = &reference.solution;

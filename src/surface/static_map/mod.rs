@@ -1,9 +1,9 @@
 //! The static map: the star's brightness does not change within a season, and the map of maximum entropy at the target
-//! chi2 stands for all maps (`docs/method.md` sections 2 to 4; Petit et al. 2015).
+//! chi2 represents all maps (`docs/method.md` sections 2 to 4; Petit et al. 2015).
 //!
 //! `reference` is the map at one vector of parameters, with its trade-off curve (`tradeoff`). `posterior` reconstructs
-//! one map for each vector, from where `prediction` and `warm_start` begin; `likelihood` is its ln L. `density` is what
-//! chains sample, in `counted` with unresolved spots as noise; `optimum` finds its maximum. `maps` are held against the
+//! one map for each vector, starting from `prediction` and `warm_start`; `likelihood` is its ln L. `density` is sampled
+//! by chains, in `counted` with unresolved spots as noise; `optimum` finds its maximum. `maps` compares maps with the
 //! data, and `surface` is the interface.
 
 mod counted;

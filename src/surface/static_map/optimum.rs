@@ -1,10 +1,10 @@
-//! The way to the reference of a static map: from the config's values, and from the peaks of the likelihood over all
-//! periods, to the best parameters and to the maximum-entropy image there (`docs/method.md` section 3, step 1).
+//! The search for the reference of a static map: from the config's values, and from the peaks of the likelihood over
+//! all periods, to the best parameters and to the maximum-entropy image there (`docs/method.md` section 3, step 1).
 //!
-//! The peaks are those of the quadratic around the first climb's end (`docs/method.md` section 4), brought into the
-//! priors where they lie outside; where there is no quadratic (K or phi fixed), orbits drawn from the prior take their
-//! place. The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last
-//! climb is on the objective asked for.
+//! The peaks are those of the quadratic around the end of the first climb (`docs/method.md` section 4), moved into the
+//! priors where they lie outside; without a quadratic (K or phi fixed), orbits drawn from the prior replace them. The
+//! search itself uses the regularised likelihood, which needs no target and is smooth everywhere; a last climb uses the
+//! requested objective.
 
 use super::{Posterior, Reference, ReferenceError, StaticMap};
 use crate::model::{FreeParameter, ParameterSpace};
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Evaluations of a climb, near its start for the most part.
+/// Evaluations of a climb, mostly near its start.
 const CLIMB: usize = 15;
 
 /// Most rebuilds of the reference.
@@ -75,7 +75,7 @@ pub(super) fn find(model: &StaticMap, sought: Sought, report: &(dyn Fn(Progress)
     unreachable!("the loop returns")
 }
 
-/// Where else to climb from, after the `first` attempt.
+/// Further starts of climbs, after the `first` attempt.
 fn other_starts(sought: Sought, chi2_target: f64, first: &Attempt) -> Result<Vec<Vec<f64>>, ReferenceError> {
     let Sought { imager, space, other_starts, seed } = sought;
     let from = first.end.as_ref().map_or(&first.start, |optimum| &optimum.theta);
@@ -94,8 +94,8 @@ fn other_starts(sought: Sought, chi2_target: f64, first: &Attempt) -> Result<Vec
     Ok(starts.filter(|theta| allowed(theta) && !reached(theta)).take(other_starts).collect())
 }
 
-/// `theta` with an orbit drawn from the prior: it is in the orbit that the landscape has several maxima, one for every
-/// alias of the sampling; the star's own parameters have one, which the climb from the config's values has found.
+/// `theta` with an orbit drawn from the prior: the likelihood has several maxima in the orbit, one for every alias of
+/// the sampling; the stellar parameters have one, which the climb from the config's values has found.
 fn with_other_orbit(space: &ParameterSpace, theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
     let draw = space.sample_prior(rng);
     let choose = |((f, drawn), kept): ((&FreeParameter, f64), &f64)| {

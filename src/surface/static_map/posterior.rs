@@ -1,4 +1,4 @@
-//! The log-probability of a parameter vector: one maximum-entropy reconstruction, judged by one of three objectives
+//! The log-probability of a parameter vector: one maximum-entropy reconstruction, evaluated by one of three objectives
 //! (`docs/method.md` section 3), times the prior; and its gradient.
 
 use super::prediction::{Prediction, Solved};
@@ -23,37 +23,37 @@ pub struct Posterior {
     kind: ObjectiveKind,
     reference: Reference,
     settings: SolverSettings,
-    /// Where evaluations start: the reference, and others.
+    /// Starts of evaluations: the reference, and others.
     warm_starts: Vec<WarmStart>,
-    /// What responses of stars close to the reference have in common; nothing where only orbit and systemic velocity
-    /// are free, so that pixels are looked at once for all evaluations.
+    /// The common part of responses of stars close to the reference; only if orbit and systemic velocity alone are
+    /// free, so that pixels are computed once for all evaluations.
     nearby: Option<Arc<Nearby>>,
 }
 
 /// Name of the spottedness of the image, such as its fractional spot coverage. Where the target chi2 is reached, it is
-/// what a first-order forecast says that it is at the target, of which the log-probability is made.
+/// a first-order forecast for the target, from which the log-probability follows.
 pub const SPOTTEDNESS: &str = "spottedness";
 
-/// Name of the chi2 of the image: near the target, where that is reached, as far as the forecast is good enough.
+/// Name of the chi2 of the image: near the target, where that is reached, within the accuracy of the forecast.
 pub const CHI2: &str = "chi2";
 
-/// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
+/// Largest velocity of any latitude (km/s, projected); beyond it a parameter vector is unphysical.
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
-/// Newton steps from a warm start before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
+/// Newton steps from a warm start before an evaluation restarts from a blank star; in the vicinity it takes 2 to 5.
 const NEWTON_STEPS: usize = 25;
 
-/// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
+/// Step of numerical derivatives of forward models, as a fraction of a coordinate's natural scale.
 const DERIVATIVE_STEP: f64 = 0.05;
 
-/// Images that a second order is taken from are this good.
+/// Precision of images for a second order.
 const BEND_TOLERANCE: f64 = 1e-6;
 
 impl Posterior {
-    /// The posterior of `space` under `imager`'s data, judged by `kind` relative to `reference`.
+    /// The posterior of `space` under `imager`'s data, by the objective `kind` relative to `reference`.
     #[doc(hidden)]
     pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
-        // the reference's pixels serve only if its fixed parameters are those of the space
+        // the reference's pixels are valid only if its fixed parameters are those of the space
         let here = space.values_at(&space.theta_of(&reference.values));
         let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.get(p) == reference.values.get(p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
@@ -73,7 +73,7 @@ impl Posterior {
     }
 
     /// The same posterior with warm starts at `thetas` (physical coordinates) besides the reference, and no others:
-    /// evaluations start from the nearest. Places without an image get none.
+    /// evaluations start from the nearest. Points without an image get none.
     #[doc(hidden)]
     pub fn with_warm_starts(mut self, thetas: &[Vec<f64>]) -> Self {
         self.warm_starts.truncate(1);
@@ -83,13 +83,13 @@ impl Posterior {
         self
     }
 
-    /// Where its warm starts are, but for the reference (physical coordinates).
+    /// Positions of its warm starts, except the reference (physical coordinates).
     #[doc(hidden)]
     pub fn warm_starts(&self) -> impl Iterator<Item = &[f64]> {
         self.warm_starts[1..].iter().map(|warm_start| warm_start.theta.as_slice())
     }
 
-    /// The same posterior with the warm starts that so many `evaluations`, spread like `thetas`, are worth.
+    /// The same posterior with the warm starts that pay off for so many `evaluations`, spread like `thetas`.
     #[doc(hidden)]
     pub fn with_warm_starts_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
         let thetas: Vec<&Vec<f64>> = sampled(thetas).into_iter().filter(|theta| self.is_physical(theta)).collect();
@@ -113,7 +113,7 @@ impl Posterior {
         let solver = Solver { entropy: self.imager.entropy, preconditioner: &preconditioner, settings };
         let mut solution = solver.solve(&mut problem, self.goal(), start(&solution));
         match solution.termination {
-            // evaluations nearby take it from here, whether this one reaches the target or not
+            // evaluations nearby start from here, whether this one reaches the target or not
             Termination::Converged | Termination::Unreachable => {
                 Solver { settings: SolverSettings::exact(), ..solver }.find_path(&mut problem, &mut solution);
             }
@@ -143,9 +143,10 @@ impl Posterior {
         WarmStart { place: place(imager, space, &theta), theta, start, preconditioner, prediction }
     }
 
-    /// A warm start's prediction to second order. For orbits around the reference it is worth its model applications
-    /// (those of an evaluation become a quarter fewer). Rotation, inclination and vsini change maps too much within
-    /// their errors: in 7-D it saves none; nor does it at a fixed lambda, where the first order leaves little.
+    /// A warm start's prediction to second order. For orbits around the reference it saves more model applications than
+    /// it costs (a quarter of those of an evaluation). Rotation, inclination and vsini change maps too much within
+    /// their uncertainties: in 7-D it saves none; nor does it at a fixed lambda, where the residual of the first order
+    /// is small.
     fn second_order(&self, warm_start: &WarmStart) -> Prediction {
         let settings = SolverSettings { tolerance: BEND_TOLERANCE, leniency: 0.0, ..SolverSettings::patient() };
         let solve = |x: &[f64]| {
@@ -157,7 +158,7 @@ impl Posterior {
         warm_start.prediction.clone().with_second_order(&self.imager, &warm_start.start, solve)
     }
 
-    /// The same posterior with other solver settings than those that a chain needs.
+    /// The same posterior with other solver settings than those of a chain.
     #[doc(hidden)]
     pub fn with_settings(self, settings: SolverSettings) -> Self {
         Posterior { settings, ..self }
@@ -169,7 +170,7 @@ impl Posterior {
         &self.reference
     }
 
-    /// What a reconstruction is judged by.
+    /// The objective.
     #[doc(hidden)]
     pub fn kind(&self) -> ObjectiveKind {
         self.kind
@@ -181,7 +182,7 @@ impl Posterior {
         &self.space
     }
 
-    /// What the data are imaged with.
+    /// Star and data.
     #[doc(hidden)]
     pub fn imager(&self) -> &Imager {
         &self.imager
@@ -195,7 +196,7 @@ impl Posterior {
         }
     }
 
-    /// Whether profiles can be computed at all at `theta`.
+    /// Whether profiles can be computed at `theta`.
     pub(super) fn is_physical(&self, theta: &[f64]) -> bool {
         is_physical(&self.imager, &self.space.values_at(theta), theta)
     }
@@ -208,7 +209,7 @@ impl Posterior {
         self.reference.goal(self.kind)
     }
 
-    /// The reconstruction at `theta`, whatever the prior says.
+    /// The reconstruction at `theta`, without the prior.
     #[doc(hidden)]
     pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
         let mut problem = self.imager.problem(self.response(theta));
@@ -239,14 +240,14 @@ impl Posterior {
         near.solve(problem, self.goal(), start)
     }
 
-    /// The evaluation that a reconstruction of so many model applications makes with its prior.
+    /// The evaluation from a reconstruction with so many model applications, including the prior.
     fn evaluation(&self, solution: &Solution, model_applications: u32, log_prior: f64) -> Evaluation {
         let numbers = vec![self.spottedness(solution), solution.chi2];
         let likelihood = self.judged(solution, numbers, model_applications);
         Evaluation { log_prob: likelihood.log_prob + log_prior, ..likelihood }
     }
 
-    /// Prior and physics, before anything is reconstructed: the prior's log-density, or why `theta` is refused.
+    /// Prior and physics, before any reconstruction: the prior's log-density, or why `theta` is refused.
     fn admit(&self, theta: &[f64]) -> Result<f64, Evaluation> {
         let log_prior = self.space.log_prior(theta);
         if log_prior == f64::NEG_INFINITY {
@@ -258,12 +259,12 @@ impl Posterior {
         Ok(log_prior)
     }
 
-    /// What changes of the forward model at a fixed map do to ln L: `weight_chi2 * chi2 + slope along direction`.
+    /// Derivatives of ln L with the forward model at a fixed map: `weight_chi2 * chi2 + slope along direction`.
     ///
-    /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem).
+    /// Regularised likelihood and entropy are extrema over maps, so that only chi2 counts (envelope theorem).
     /// Spottedness is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system
     /// `H y = A' - 2 mu g`, `g y = 0` (g the gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`. The
-    /// solution's path is found again: the solver is content with that of a solution near by.
+    /// solution's path is recomputed: the solver is satisfied with that of a neighbouring solution.
     fn sensitivity(
         &self,
         theta: &[f64],
@@ -300,7 +301,7 @@ impl Posterior {
     }
 }
 
-/// Whether profiles can be computed at all at `values`, whose free ones are `theta`.
+/// Whether profiles can be computed at `values`, whose free ones are `theta`.
 pub fn is_physical(imager: &Imager, values: &ParameterValues, theta: &[f64]) -> bool {
     let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
     let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);

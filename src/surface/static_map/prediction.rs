@@ -1,9 +1,9 @@
-//! A prediction of image and lambda from a known solution: how both change with each parameter (`docs/method.md`
+//! A prediction of image and lambda from a known solution by their derivatives with each parameter (`docs/method.md`
 //! section 2), to first or to second order.
 //!
 //! The solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term set so that
-//! chi2 stays at the target (or left out at a fixed lambda). What that leaves over is taken from solutions near by. It
-//! is where an evaluation starts, and saves it a Newton step or two; what it ends at does not depend on it beyond the
+//! chi2 stays at the target (or omitted at a fixed lambda). The residual is estimated from neighbouring solutions. The
+//! prediction starts an evaluation and saves it a Newton step or two; the result does not depend on it beyond the
 //! solver's tolerance.
 
 use crate::maxent::{Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start};
@@ -18,7 +18,7 @@ use crate::surface::objective::ObjectiveKind;
 pub struct Prediction {
     /// Internal coordinates of the solution.
     origin: Vec<f64>,
-    /// Its image, which would take a hundredth of an evaluation each time.
+    /// Its image, which would otherwise take a hundredth of each evaluation.
     map: Vec<f64>,
     /// Natural scales of the coordinates.
     scales: Vec<f64>,
@@ -26,50 +26,50 @@ pub struct Prediction {
     image: Vec<Vec<f32>>,
     /// Change of ln(lambda) per natural scale of each coordinate.
     ln_lambda: Vec<f64>,
-    /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness does not matter.
+    /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness is not used.
     adjoint: Vec<f32>,
     /// Second order, pair by pair of coordinates; empty where it is not known.
     bends: Vec<Bend>,
 }
 
-/// What the first order leaves over, per product of two coordinates in natural scales.
+/// The residual of the first order, per product of two coordinates in natural scales.
 #[derive(Clone, Debug)]
 struct Bend {
     coordinates: [usize; 2],
-    /// Of the image's coordinates, and of ln(lambda) behind them.
+    /// Change of the image's coordinates, followed by that of ln(lambda).
     change: Vec<f32>,
 }
 
-/// Numerical derivatives step by this share of a coordinate's natural scale.
+/// Step of numerical derivatives, as a fraction of a coordinate's natural scale.
 const STEP: f64 = 0.05;
 
-/// Predictions reach this many natural scales in any coordinate; beyond, they are followed no further.
+/// Predictions reach this many natural scales in any coordinate; beyond, they are constant.
 const REACH: f64 = 3.0;
 
-/// Solutions for the second order are so many natural scales away.
+/// Distance of the solutions for the second order, in natural scales.
 const BEND_STEP: f64 = 0.4;
 
-/// The second order is followed no farther than this many natural scales: beyond, it takes model applications instead
-/// of saving them.
+/// The second order reaches no farther than this many natural scales: beyond, it costs model applications instead of
+/// saving them.
 const BEND_REACH: f64 = 1.5;
 
 /// Largest change of a coordinate of the image by either order.
 const LARGEST_STEP: f32 = 1.0;
 
-/// Beyond it a change of an image per natural scale is absurd.
+/// A change of an image per natural scale beyond this is invalid.
 const LARGEST_CHANGE: f32 = 1e30;
 
-/// Largest change of ln(lambda) that is predicted.
+/// Largest predicted change of ln(lambda).
 const LN_LAMBDA_REACH: f64 = 1.0;
 
-/// A solution, where it is, and what it was solved with.
+/// A solution, its position, and its settings.
 #[derive(Clone, Copy)]
 pub struct Solved<'a> {
-    /// Written coordinates.
+    /// Physical coordinates.
     pub theta: &'a [f64],
     /// The response there.
     pub response: &'a Response,
-    /// What was solved for; at the bound of lambda, the image at that lambda.
+    /// The goal of the solver; at the bound of lambda, the image at that lambda.
     pub goal: Goal,
     /// The solution.
     pub solution: &'a Solution,
@@ -78,7 +78,8 @@ pub struct Solved<'a> {
 }
 
 impl Prediction {
-    /// Of the solutions around `solved` for `kind`, with `response(theta)` at points of `space` (physical coordinates).
+    /// For the solutions around `solved` for `kind`, with `response(theta)` at points of `space` (physical
+    /// coordinates).
     pub fn new(
         imager: &Imager,
         space: &ParameterSpace,
@@ -143,8 +144,8 @@ impl Prediction {
         Prediction { origin, map, scales, image, ln_lambda, adjoint, bends: Vec::new() }
     }
 
-    /// The same to second order, with `solve` giving the images at sampling coordinates around that of the solution and
-    /// `known` as in [`Prediction::start`]; to first order where an image is missing.
+    /// The same to second order, with `solve` returning the images at sampling coordinates around that of the solution
+    /// and `known` as in [`Prediction::start`]; to first order where an image is missing.
     pub fn with_second_order(self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Self {
         let is_finite = |bend: &Bend| bend.change.iter().all(|x| x.is_finite());
         let found = self.find_bends(imager, known, solve);
@@ -153,7 +154,7 @@ impl Prediction {
     }
 
     fn find_bends(&self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Option<Vec<Bend>> {
-        // what the first order leaves over after a step forwards or backwards along some of the coordinates
+        // the residual of the first order after a step forwards or backwards along some of the coordinates
         let left_over = |moves: &[(usize, f64)]| {
             let mut x = self.origin.clone();
             moves.iter().for_each(|(i, sign)| x[*i] += sign * BEND_STEP * self.scales[*i]);
@@ -179,20 +180,20 @@ impl Prediction {
         Some(bends)
     }
 
-    /// Whether all its numbers are finite and within reason; those of the second order always are.
+    /// Whether all its values are finite and within bounds; those of the second order always are.
     pub fn is_finite(&self) -> bool {
-        // in single precision sums of them have to be finite, too
+        // sums in single precision must be finite, too
         let image = self.image.iter().flatten().all(|x| x.abs() < LARGEST_CHANGE);
         image && self.ln_lambda.iter().all(|x| x.is_finite()) && self.adjoint.iter().all(|x| x.is_finite())
     }
 
-    /// Bytes that it takes in memory, all but a few; the second order, which the reference alone has, is not counted.
+    /// Approximate size in memory (bytes); the second order, which only the reference has, is not counted.
     pub fn bytes(&self) -> usize {
         let image: usize = self.image.iter().map(|step| size_of_val(&step[..])).sum();
         image + size_of_val(&self.map[..]) + size_of_val(&self.adjoint[..])
     }
 
-    /// Where an evaluation at the sampling coordinates `x` starts, if one at the known solution starts from `known`.
+    /// The start of an evaluation at the sampling coordinates `x`, if one at the known solution starts from `known`.
     pub fn start(&self, imager: &Imager, known: &Start, x: &[f64]) -> Start {
         let away = x.iter().zip(&self.origin).zip(&self.scales);
         let shifts: Vec<f64> = away.map(|((x, x0), scale)| (x - x0) / scale).collect();

@@ -1,7 +1,7 @@
-//! The reference: the Doppler image at one point of parameter space that every evaluation starts from, with the
-//! preconditioner and the trade-off curve that belong to it (`docs/method.md` sections 2 and 3).
+//! The reference: the Doppler image at one point of parameter space that every evaluation starts from, with its
+//! preconditioner and trade-off curve (`docs/method.md` sections 2 and 3).
 //!
-//! Built once, deterministically, before a chain begins; never changed by it.
+//! Built once, deterministically, before a chain begins; the chain never changes it.
 
 use super::tradeoff::{Node, TradeOff};
 use crate::maxent::{
@@ -13,7 +13,8 @@ use crate::surface::imaging::Imager;
 use crate::surface::objective::ObjectiveKind;
 use std::sync::Arc;
 
-/// Rank of the preconditioner of one map; directions beyond it have lambda x curvature below 1 on the paper's setup.
+/// Rank of the preconditioner of one map; directions beyond it have lambda x curvature below 1 on the setup of Petit et
+/// al.
 const PRECONDITIONER_RANK: usize = 112;
 
 /// Directions with lambda x curvature below this need no preconditioning.
@@ -22,41 +23,40 @@ const SMALLEST_CURVATURE: f64 = 0.2;
 /// Step in ln(lambda) between nodes of the trade-off curve.
 const CURVE_STEP: f64 = 0.25;
 
-/// Residual of the Newton systems on the way to a node: more steps, and fewer model applications. Slopes are of one
-/// system solved well.
+/// Residual of the Newton systems on the path to a node: more steps, and fewer model applications. Slopes use one
+/// precise solution.
 const CURVE_CG_TOLERANCE: f64 = 0.05;
 
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
 const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
-/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many
+/// Data become significant at lambda = this over their number, where the entropy of a spotted star equals that many
 /// chi2. This and the lambdas below are in the entropy's unit.
 const BLANK_LAMBDA: f64 = 3e-3;
 
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
 const FIRST_CHI2: f64 = 1.5;
 
-/// chi2 per datum, all of them independent, that a map fits to: the paper's.
+/// chi2 per datum, all of them independent, that a map reaches: that of Petit et al.
 const USUAL_CHI2: f64 = 0.97;
 
-/// Error allowed to the image of a provisional reference: a worse one costs every evaluation that starts from it model
+/// Tolerance of the image of a provisional reference: a worse one costs every evaluation that starts from it model
 /// applications.
 const PROVISIONAL_TOLERANCE: f64 = 1e-7;
 
-/// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
+/// A target is given up at lambda = this over the number of data, some twenty times that of the setup of Petit et al.
 const HOPELESS_LAMBDA: f64 = 40.0;
 
-/// chi2 per datum that no map of noisy data comes down to.
+/// chi2 per datum below that of any map of noisy data.
 const OUT_OF_REACH: f64 = 1e-6;
 
 /// A chi2 within this factor of the target is not the floor, wherever the solver stopped.
 const ABOVE_TARGET: f64 = 1.001;
 
-/// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into
-/// spots.
+/// A provisional reference stops at lambda = this over the number of data: beyond, noise is turned into spots.
 pub const PROVISIONAL_LAMBDA: f64 = 3.0;
 
-/// The reference image and what belongs to it.
+/// The reference image with its preconditioner and curve.
 #[derive(Clone, Debug)]
 pub struct Reference {
     /// The point of parameter space.
@@ -67,13 +67,13 @@ pub struct Reference {
     pub solution: Solution,
     /// Approximate inverse of the Newton systems around it.
     pub preconditioner: Arc<Preconditioner>,
-    /// How much chi2 its spottedness is worth.
+    /// Trade-off between its chi2 and spottedness.
     pub tradeoff: TradeOff,
     /// Target of chi2.
     pub chi2_target: f64,
     /// Largest lambda of an evaluation: the end of the trade-off curve.
     pub largest_lambda: f64,
-    /// Applications of the response or its transpose that all this took.
+    /// Total number of applications of the response or its transpose.
     pub model_applications: u32,
 }
 
@@ -92,7 +92,7 @@ pub enum ReferenceError {
         /// Smallest chi2 found, per datum.
         floor: f64,
     },
-    /// The blank star already fits better than the target: data or errors cannot be right.
+    /// The blank star already fits better than the target: data or uncertainties must be wrong.
     #[error(
         "a star without spots already fits with chi2 = {blank:.4} per datum, below the target of {target:.4}: the \
         errors \
@@ -109,7 +109,7 @@ pub enum ReferenceError {
     Solver(Termination),
 }
 
-/// Why there is no image, and what to look at.
+/// Why there is no image, and what to check.
 fn why(termination: Termination) -> &'static str {
     match termination {
         Termination::StepLimit => {
@@ -124,7 +124,7 @@ fn why(termination: Termination) -> &'static str {
 }
 
 impl ReferenceError {
-    /// Whether the solver needed more steps than it may take, as it does where the model is far from the profiles.
+    /// Whether the solver needed more steps than allowed, as happens where the model is far from the profiles.
     pub fn ran_out_of_steps(&self) -> bool {
         matches!(self, ReferenceError::Solver(Termination::StepLimit))
     }
@@ -134,16 +134,16 @@ impl Reference {
     /// The reference at `values` for the target `chi2_per_datum`.
     ///
     /// # Errors
-    /// If no map comes down to the target, or a blank star is below it already.
+    /// If no map reaches the target, or a blank star is below it already.
     pub fn build(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
         let data = imager.data.depth.len() as f64;
         let mut reference = Reference::approach(imager, values, chi2_per_datum, HOPELESS_LAMBDA)?;
         match reference.solution.termination {
             Termination::Converged => {}
-            // out of steps on the doorstep: the exact solution is a few more away
+            // out of steps close to the target: the exact solution is a few more away
             Termination::StepLimit if reference.solution.chi2 <= ABOVE_TARGET * reference.chi2_target => {}
-            // a search for the floor that runs out of steps far from the target has found it to within what a message
-            // needs
+            // a search for the floor that runs out of steps far from the target has found it precisely enough for a
+            // message
             Termination::Unreachable | Termination::StepLimit
                 if reference.solution.chi2 > ABOVE_TARGET * reference.chi2_target =>
             {
@@ -163,7 +163,7 @@ impl Reference {
         if solution.termination != Termination::Converged {
             return Err(ReferenceError::Solver(solution.termination));
         }
-        // where there was no step left to take, the path is that of a rougher solution
+        // where no step remained, the path is that of a rougher solution
         solver.find_path(&mut problem, &mut solution);
         reference.tradeoff = follow(&solver, &mut problem, &solution);
         reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
@@ -173,12 +173,12 @@ impl Reference {
     }
 
     /// A reference to begin a search with: without a trade-off curve (the regularised likelihood needs none), and with
-    /// the lambda it got where the target cannot be reached.
+    /// the final lambda where the target cannot be reached.
     ///
     /// # Errors
     /// If a blank star is below the target already, or the solver fails.
     pub fn provisional(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
-        // a lower target is that of data of which fewer are independent, which bear the larger weight
+        // a lower target belongs to data of which fewer are independent, which allow the larger weight
         let largest_lambda = PROVISIONAL_LAMBDA / (chi2_per_datum / USUAL_CHI2).min(1.0);
         let mut reference = Reference::approach(imager, values, chi2_per_datum, largest_lambda)?;
         if reference.solution.termination == Termination::NonFinite {
@@ -192,7 +192,7 @@ impl Reference {
         if matches!(precise.termination, Termination::Converged | Termination::Unreachable) {
             reference.solution = precise;
         }
-        // evaluations nearby take its path, which the last step has left as it was before
+        // evaluations nearby use its path, which the last step has not updated
         Solver { settings: SolverSettings::exact(), ..solver }.find_path(&mut problem, &mut reference.solution);
         reference.tradeoff = TradeOff::new(vec![node(&reference.solution)], 0);
         reference.model_applications += problem.model_applications();
@@ -255,7 +255,7 @@ impl Reference {
         })
     }
 
-    /// What every evaluation by `kind` solves for.
+    /// The goal of every evaluation by `kind`.
     pub fn goal(&self, kind: ObjectiveKind) -> Goal {
         match kind {
             ObjectiveKind::RegularisedLikelihood | ObjectiveKind::MarginalLikelihood => {
@@ -267,25 +267,25 @@ impl Reference {
         }
     }
 
-    /// A blank star, where an evaluation far from the reference starts.
+    /// A blank star, the start of an evaluation far from the reference.
     pub fn blank(&self, imager: &Imager) -> Start {
         let lambda = imager.entropy.lambda_unit() * BLANK_LAMBDA / imager.data_as_of_one_map();
         Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.areas.len(), lambda) }
     }
 
-    /// Where an evaluation at the reference starts.
+    /// The start of an evaluation at the reference.
     pub fn start(&self) -> Start {
         Start { best: Some(self.best()), ..start(&self.solution) }
     }
 
-    /// What evaluations elsewhere are compared with.
+    /// The solution with which evaluations elsewhere are compared.
     pub fn best(&self) -> Best {
         let Solution { spottedness, entropy, chi2, image, .. } = &self.solution;
         Best { spottedness: *spottedness, merit: entropy / image.lambda - 0.5 * chi2 }
     }
 }
 
-/// Where the next solution starts from this one.
+/// The start of the next solution from this one.
 pub(super) fn start(solution: &Solution) -> Start {
     let Solution { image, path, chi2_slope, .. } = solution;
     Start { image: image.clone(), path: path.clone(), chi2_slope: *chi2_slope, adjoint: Vec::new(), best: None }

@@ -1,22 +1,22 @@
-//! Spots that the map leaves over, counted as noise.
+//! Residual unresolved spots of the map, counted as noise.
 //!
-//! The information counts spots as the entropy sees them: many small and independent ones. Real spots have edges, and
-//! what a map of the highest entropy misses of them is larger (25 times in variance for discs at a signal-to-noise
-//! ratio of 1000) and goes with the star: most of it looks like an orbit at the rotation period or its fractions. Its
-//! covariance has the shape of what spots add to noise, `information - noise`; its size is fitted, one number, as that
-//! of a jitter would be, to the gradient itself. Without it, half of all stars without a planet show one
-//! (`results/calibration.md`).
+//! The information counts spots with the prior of the entropy: many small and independent ones. Real spots have edges,
+//! and the part of them that a map of the highest entropy misses is larger (25 times in variance for discs at a
+//! signal-to-noise ratio of 1000) and rotates with the star: most of it looks like an orbit at the rotation period or
+//! its fractions. Its covariance has the shape of the contribution of spots to the noise, `information - noise`; its
+//! size is one parameter, fitted to the gradient itself, like a jitter. Without it, half of all stars without a planet
+//! show one (`results/calibration.md`).
 
 use crate::surface::expansion::{Expansion, Nuisance};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Range of the factor on the variance of what spots add.
+/// Range of the factor on the variance by spots.
 pub const UNRESOLVED_SPOTS: (f64, f64) = (1.0, 1e6);
 
 impl Expansion {
-    /// How many times larger than the entropy expects the unresolved spots are, in variance: the factor with which the
-    /// gradient at the centre is most probable, the `nuisances` being anywhere within their priors. `None` where none
-    /// is possible.
+    /// Size of the unresolved spots relative to the entropy's expectation, in variance: the factor with which the
+    /// gradient at the centre is most probable, with free `nuisances` within their priors. `None` where none is
+    /// possible.
     pub fn unresolved_spots(&self, nuisances: &[Nuisance]) -> Option<f64> {
         let moved = &self.information * self.columns(nuisances);
         let (sd, offset) = self.priors(nuisances);
@@ -61,8 +61,8 @@ impl Expansion {
         Some(symmetric(&inverse * self.covariance_with_unresolved_spots(factor) * &inverse))
     }
 
-    /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the
-    /// curvature of the model make of the difference.
+    /// Contribution of spots to the covariance of the gradient according to the entropy: positive, despite rounding and
+    /// the curvature of the model in the difference.
     fn spots(&self) -> DMatrix<f64> {
         let scale = self.information.diagonal().map(|i| i.max(f64::MIN_POSITIVE).sqrt());
         let (scale, back) = (DMatrix::from_diagonal(&scale), DMatrix::from_diagonal(&scale.map(f64::recip)));
@@ -72,7 +72,7 @@ impl Expansion {
     }
 
     /// Standard deviations of the nuisances' priors, and how far their means are from the centre. A prior wider than a
-    /// thousand standard errors is as good as flat.
+    /// thousand standard errors is effectively flat.
     pub(in crate::surface) fn priors(&self, nuisances: &[Nuisance]) -> (DVector<f64>, DVector<f64>) {
         const FLAT: f64 = 1e3;
         let columns = self.columns(nuisances);
@@ -87,7 +87,7 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
     0.5 * (&matrix + matrix.transpose())
 }
 
-/// Where a function of one valley or more is lowest: the lowest of many places, and the golden section around it.
+/// The minimum of a function with one valley or more: the lowest of many points, refined by a golden-section search.
 fn minimum(f: impl Fn(f64) -> f64, (low, high): (f64, f64)) -> f64 {
     const PLACES: usize = 40;
     let step = (high - low) / PLACES as f64;
@@ -109,8 +109,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_distr::StandardNormal;
 
-    /// Gradients drawn with spots 30 times what the information says, and a systemic velocity within its prior: the
-    /// factor comes back, the velocities stay, their covariance is the one that they have, and the prior is left alone.
+    /// Gradients drawn with spots 30 times the information's, and a systemic velocity within its prior: the factor is
+    /// recovered, the velocities stay, their covariance is correct, and the prior is unchanged.
     #[test]
     fn the_size_of_unresolved_spots_is_found() {
         let n = 60;

@@ -20,15 +20,15 @@ use crate::surface::{
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Targets of chi2, relative to the one asked for, at which an orbit is looked at.
+/// Targets of chi2, relative to the requested one, at which an orbit is evaluated.
 const TARGETS: [f64; 3] = [0.97, 1.0, 1.03];
-/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
+/// chi2 per datum that many of its standard deviations from 1 is a warning.
 const FAR: f64 = 5.0;
-/// A target is missed by more than this factor; errors that were measured are such that it is just reached.
+/// A target is missed by more than this factor; with measured uncertainties it is just reached.
 const MISSED: f64 = 1.02;
 
 impl StaticMap {
-    /// What it is.
+    /// Its properties.
     pub const PROPERTIES: Properties = Properties {
         name: "static map",
         under_way: "reconstructing",
@@ -114,7 +114,7 @@ impl SurfaceModel for StaticMap {
         FieldErrors::default()
     }
 
-    /// Whether the image fits as it should.
+    /// Remarks where the image does not fit properly.
     fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let correlated_bins = imager.data.correlated_bins;

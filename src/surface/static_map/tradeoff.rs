@@ -1,9 +1,9 @@
-//! The trade-off curve of the reference: how much chi2 a given spottedness (or entropy) is worth (`docs/method.md`
-//! section 3, step 2).
+//! The trade-off curve of the reference: chi2 as a function of spottedness (or entropy) (`docs/method.md` section 3,
+//! step 2).
 //!
 //! Nodes along the path of maximum-entropy images, from the reference to larger and smaller lambda; between them chi2
-//! is a cubic in spottedness with the exact slopes of the path. Beyond its ends the curve goes on along its tangent, so
-//! that it stays monotone everywhere.
+//! is a cubic in spottedness with the exact slopes of the path. Beyond its ends the curve continues along its tangent,
+//! so that it is monotone everywhere.
 
 /// One image on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Node {
     pub chi2_per_spottedness: f64,
 }
 
-/// Which measure of an image is traded for chi2.
+/// The measure of an image that is traded for chi2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// Spottedness: grows as chi2 falls.
@@ -38,7 +38,7 @@ pub struct TradeOff {
 
 impl TradeOff {
     /// From nodes of falling chi2. Only the stretch around node `reference` along which spottedness grows is kept:
-    /// beyond, it says nothing about chi2.
+    /// beyond, it does not determine chi2.
     pub fn new(nodes: Vec<Node>, reference: usize) -> Self {
         let good = |a: &Node, b: &Node| {
             a.spottedness < b.spottedness && a.entropy > b.entropy && b.chi2 < a.chi2 && b.chi2_per_spottedness < 0.0

@@ -1,8 +1,8 @@
 //! The quadratic at one period (or two, with the shapes of the orbits): a Gaussian in all other coordinates.
 //!
 //! With `x = T y + o` the coordinates of the expansion, y the linear ones (K cos, K sin, systemic velocity, stellar
-//! parameters) and T's first columns the velocities of unit orbits (`planet`): of a circle the cosine and sine of its
-//! angle. Then `ln L = c + b y - y A y / 2`.
+//! parameters) and T's first columns the velocities of unit orbits (`planet`): for a circular one the cosine and sine
+//! of its angle. Then `ln L = c + b y - y A y / 2`.
 
 use super::interpolation::{Interpolation, Pieces};
 use super::planet::{Nonlinear, Planet};
@@ -12,31 +12,31 @@ use crate::surface::expansion::Expansion;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::RngCore;
 
-/// What a quadratic in the linear coordinates is made for.
+/// The nonlinear coordinates that determine a quadratic in the linear ones.
 #[derive(Clone, Debug)]
 pub(super) struct Given {
-    /// What of each planet the velocities are not linear in.
+    /// The coordinates of each planet in which the velocities are not linear.
     pub planets: Vec<Nonlinear>,
-    /// The sampling coordinates that expansions are interpolated over; empty where there is one expansion.
+    /// The sampling coordinates over which expansions are interpolated; empty where there is one expansion.
     pub field: DVector<f64>,
 }
 
-/// Where the pieces come from.
+/// The source of the pieces.
 #[derive(Clone, Debug)]
 enum Source {
     /// One expansion.
     One(Pieces),
-    /// Several, between which they are interpolated, with the positions of the coordinates.
+    /// Several, with interpolation between them, and the positions of the coordinates.
     Several(Interpolation, Vec<usize>),
 }
 
-/// What the quadratics of all periods have in common.
+/// The common part of the quadratics of all periods.
 #[derive(Clone, Debug)]
 pub(super) struct LinearModel {
     /// Rotation cycles from mid-time.
     cycles: Vec<f64>,
     source: Source,
-    /// Columns of T but for those of orbits.
+    /// Columns of T except those of orbits.
     columns: DMatrix<f64>,
     /// The planets, whose columns come first, in this order.
     planets: Vec<Planet>,
@@ -49,8 +49,7 @@ pub(super) struct LinearModel {
     prior_pull: DVector<f64>,
 }
 
-/// What is added to ln L at every period: `constant + gradient (y - centre) - (y - centre) information (y - centre) /
-/// 2`.
+/// Added to ln L at every period: `constant + gradient (y - centre) - (y - centre) information (y - centre) / 2`.
 #[derive(Clone, Debug)]
 pub(super) struct Correction {
     pub centre: DVector<f64>,
@@ -64,21 +63,21 @@ pub(super) struct Conditional {
     information: DMatrix<f64>,
     gradient: DVector<f64>,
     constant: f64,
-    /// Of what is drawn from: with the normal priors, at the temperature.
+    /// Of the distribution for draws: with the normal priors, at the temperature.
     factor: Cholesky<f64, Dyn>,
     mode: DVector<f64>,
     log_determinant: f64,
 }
 
 impl LinearModel {
-    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's
+    /// From an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's
     /// velocities are linear in some of its free parameters.
     pub fn new(expansion: &Expansion, space: &ParameterSpace, mid_cycle: f64) -> Option<Self> {
         LinearModel::of(&[(DVector::zeros(0), expansion)], &[], space, mid_cycle)
     }
 
-    /// Of expansions in the velocities at some places, between which they are interpolated: values of the coordinates
-    /// at these `positions`. `None` also where the places are too few.
+    /// From expansions in the velocities at some points, interpolated between them: values of the coordinates at these
+    /// `positions`. `None` also where there are too few points.
     pub fn of(
         expansions: &[(DVector<f64>, &Expansion)],
         positions: &[usize],
@@ -112,7 +111,7 @@ impl LinearModel {
         let normal = |i: Option<usize>| match i.map(|i| space.free()[i]) {
             Some(f) => match f.prior {
                 Prior::Normal { mean, sd, .. } => {
-                    // in the coordinate that is sampled, to first order
+                    // in the sampling coordinate, to first order
                     let p = f.parameter;
                     let sd = sd * (-p.log_jacobian(mean)).exp();
                     (sd.powi(-2), p.to_sampling(mean) * sd.powi(-2))
@@ -152,7 +151,7 @@ impl LinearModel {
         })
     }
 
-    /// With a correction to ln L in place of the one that there is.
+    /// With a correction to ln L that replaces the previous one.
     pub fn with_correction(self, correction: Correction) -> Self {
         LinearModel { correction: Some(correction), ..self }
     }
@@ -176,13 +175,13 @@ impl LinearModel {
         self.planets[..planet].iter().map(Planet::columns).sum()
     }
 
-    /// Circles of these periods, in the middle of the places that expansions are interpolated between.
+    /// Circular orbits of these periods, in the middle of the points of the interpolation.
     pub fn circles(&self, period: impl Fn(usize) -> f64) -> Given {
         let planets = self.planets.iter().enumerate().map(|(i, planet)| planet.circle(period(i))).collect();
         Given { planets, field: self.interpolation().map_or(DVector::zeros(0), |(between, _)| between.centre()) }
     }
 
-    /// What expansions are interpolated with, and the positions of its coordinates.
+    /// The interpolation of the expansions, and the positions of its coordinates.
     pub fn interpolation(&self) -> Option<(&Interpolation, &[usize])> {
         match &self.source {
             Source::One(_) => None,
@@ -190,7 +189,7 @@ impl LinearModel {
         }
     }
 
-    /// What of a position is not linear, and what is.
+    /// The nonlinear and the linear coordinates of a position.
     pub fn split(&self, position: &[f64]) -> (Given, DVector<f64>) {
         let (planets, linear): (Vec<_>, Vec<_>) = self.planets.iter().map(|planet| planet.split(position)).unzip();
         let linear = linear.into_iter().flatten().chain(self.others.iter().map(|&i| position[i]));
@@ -214,8 +213,8 @@ impl LinearModel {
         position
     }
 
-    /// The quadratic for what is given, drawn from as if ln L were divided by `temperature`; `None` where it has no
-    /// maximum.
+    /// The quadratic for given nonlinear coordinates, with draws as if ln L were divided by `temperature`; `None` where
+    /// it has no maximum.
     pub fn at(&self, given: &Given, temperature: f64) -> Option<Conditional> {
         match &self.source {
             Source::One(pieces) => self.of_pieces(pieces, given, temperature),
@@ -265,13 +264,13 @@ impl Conditional {
         self.constant + self.gradient.dot(y) - 0.5 * y.dot(&(&self.information * y))
     }
 
-    /// Where the drawn distribution is densest.
+    /// The mode of the distribution for draws.
     pub fn mode(&self) -> DVector<f64> {
         self.mode.clone()
     }
 
-    /// K at the mode, or its standard error if that is larger, all else known, of a planet whose columns begin at
-    /// `first`.
+    /// K at the mode, or its standard error if that is larger, with all other coordinates known, of a planet whose
+    /// columns begin at `first`.
     pub fn amplitude(&self, first: usize) -> f64 {
         let error = (2.0 / (self.information[(first, first)] + self.information[(first + 1, first + 1)])).sqrt();
         self.mode[first].hypot(self.mode[first + 1]).max(error)

@@ -1,8 +1,8 @@
-//! The surrogate brought closer to the posterior that is sampled: a quadratic in the linear coordinates, fitted to what
-//! a few hundred reconstructions say beyond it.
+//! The surrogate corrected towards the sampled posterior: a quadratic in the linear coordinates, fitted to the
+//! differences at a few hundred reconstructions.
 //!
 //! The expansion is that of the regularised likelihood. Spottedness, which is no extremum over maps, falls faster in
-//! the star's own parameters (by a fifth of their errors on the paper's setup).
+//! the stellar parameters (by a fifth of their uncertainties on the setup of Petit et al.).
 
 use super::Surrogate;
 use super::conditional::Correction;
@@ -11,36 +11,35 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Reconstructions for each coefficient.
+/// Reconstructions per coefficient.
 const POINTS: usize = 8;
 
-/// Temperature at which the points are drawn: a little wider than where the fit is used.
+/// Temperature of the draws: slightly wider than the region in which the fit is used.
 const TEMPERATURE: f64 = 1.5;
 
-/// Points this much below the highest in ln P do not count: the quadratic need not be right there.
+/// Points this much below the highest in ln P do not count: the quadratic may be wrong there.
 const REACH: f64 = 20.0;
 
-/// Fewest points for each coefficient that must have given a log-probability.
+/// Fewest points with a log-probability per coefficient.
 const ENOUGH: f64 = 3.0;
 
-/// A share of proposals accepted that is good enough.
+/// A sufficient fraction of accepted proposals.
 const GOOD: f64 = 0.6;
 
-/// Draws on which the surrogate is tried.
+/// Draws for testing the surrogate.
 const TRIALS: usize = 64;
 
 /// A draw: internal and physical coordinates, and log-probability.
 pub(super) type Drawn = (Vec<f64>, Vec<f64>, f64);
 
 impl Surrogate {
-    /// The surrogate fitted to `density`, if that is better than as it was, and the share of its proposals that are
-    /// accepted.
+    /// The surrogate fitted to `density`, if that improves it, and the fraction of its proposals that are accepted.
     pub fn fitted(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
         let acceptance = self.acceptance(density, evaluator);
         self.fitted_beyond(acceptance, density, evaluator)
     }
 
-    /// The same where that is worth its evaluations: where few of its own proposals are accepted.
+    /// The same if few of its proposals are accepted; otherwise the fit does not justify its evaluations.
     pub fn fitted_if_poor(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
         match self.acceptance(density, evaluator) {
             good if good > GOOD => (self, good),
@@ -55,8 +54,8 @@ impl Surrogate {
         (best, acceptance)
     }
 
-    /// The surrogate with what `density` says beyond it, by least squares over draws of the surrogate itself, which
-    /// depend on nothing but it. `None` where too few draws say anything, or no maximum is left.
+    /// The surrogate with the differences to `density`, by least squares over draws of the surrogate itself, which
+    /// depend only on it. `None` where too few draws have a log-probability, or no maximum is left.
     fn corrected(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> Option<Self> {
         let count = self.model.linear_count();
         let terms = 1 + count + count * (count + 1) / 2;
@@ -83,9 +82,9 @@ impl Surrogate {
         self.acceptance_of(&self.evaluated(TRIALS, density, evaluator), density)
     }
 
-    /// Share of the surrogate's proposals that `density` accepts from where a chain is: its draws, each with the weight
-    /// that `density` has over the surrogate there. Without the weights the few draws where the surrogate is far too
-    /// low, and a chain stays for long, would hardly count.
+    /// Fraction of the surrogate's proposals that `density` accepts from the region of a chain: of its draws, each with
+    /// the weight of `density` over the surrogate there. Without the weights the few draws where the surrogate is far
+    /// too low, and a chain stays for long, would hardly count.
     pub(super) fn acceptance_of(&self, draws: &[Drawn], density: &dyn LogDensity) -> f64 {
         let beyond: Vec<f64> = draws
             .iter()
@@ -97,7 +96,7 @@ impl Surrogate {
             |position: &Vec<f64>| self.place(position).is_some_and(|at| self.walk(at, &mut rng).position != *position);
         let moved =
             draws.iter().map(|draw| &draw.0).map(moves).filter(|moved| *moved).count() as f64 / draws.len() as f64;
-        // what has no log-probability is never accepted, and neither is what cannot be drawn
+        // points without a log-probability are never accepted, and neither are those that cannot be drawn
         let highest = beyond.iter().copied().filter(|beyond| beyond.is_finite()).fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> =
             beyond.iter().map(|beyond| if beyond.is_finite() { (beyond - highest).exp() } else { 0.0 }).collect();

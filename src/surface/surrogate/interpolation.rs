@@ -1,8 +1,8 @@
-//! Quadratics between places at which they are known: sums of them, with weights that depend on the place.
+//! Interpolation of quadratics between points at which they are known: sums of them, with weights that depend on the
+//! point.
 //!
 //! A cubic radial basis with a quadratic tail (Wendland 2005, *Scattered Data Approximation*, section 8.2), in
-//! coordinates in which the places scatter alike in all directions. It is exact at the places, and everywhere for
-//! quadratics.
+//! coordinates in which the points scatter isotropically. It is exact at the points, and everywhere for quadratics.
 
 use super::student;
 use nalgebra::{DMatrix, DVector};
@@ -18,24 +18,24 @@ pub(super) struct Pieces {
     pub informed: DMatrix<f64>,
 }
 
-/// Pieces between places.
+/// Interpolated pieces.
 #[derive(Clone, Debug)]
 pub(super) struct Interpolation {
-    /// Mean of the places, and the factor of their covariance.
+    /// Mean of the points, and the factor of their covariance.
     centre: DVector<f64>,
     factor: DMatrix<f64>,
-    /// The places in units of their scatter.
+    /// The points in units of their scatter.
     places: Vec<DVector<f64>>,
-    /// From the basis at a place to the weights of all places.
+    /// From the basis at a point to the weights of all known points.
     weights: DMatrix<f64>,
-    /// Pieces of each place (columns), one below the other.
+    /// Pieces of each point (columns), one below the other.
     pieces: DMatrix<f64>,
     /// Number of velocities and of other linear coordinates.
     shape: (usize, usize),
 }
 
 impl Interpolation {
-    /// Between these places; `None` where they are too few, or on a plane.
+    /// Between these points; `None` where they are too few, or on a plane.
     pub fn new(places: &[(&DVector<f64>, Pieces)]) -> Option<Self> {
         let (first, pieces) = places.first()?;
         let (count, dimension) = (places.len(), first.len());
@@ -65,12 +65,12 @@ impl Interpolation {
         this.weights.iter().all(|w| w.is_finite()).then_some(this)
     }
 
-    /// Mean of the places.
+    /// Mean of the points.
     pub fn centre(&self) -> DVector<f64> {
         self.centre.clone()
     }
 
-    /// The pieces at a place.
+    /// The pieces at a point.
     pub fn at(&self, place: &DVector<f64>) -> Pieces {
         let ((n, others), at) = (self.shape, self.in_units(place));
         let weights = &self.weights * self.basis(&at.expect("a factor has no zero on its diagonal"));
@@ -86,7 +86,7 @@ impl Interpolation {
         }
     }
 
-    /// A place from a t distribution with mean and covariance of the places, times `temperature`, and ln of its
+    /// A point from a t distribution with mean and covariance of the known points, times `temperature`, and ln of its
     /// density.
     pub fn draw(&self, temperature: f64, rng: &mut dyn RngCore) -> (DVector<f64>, f64) {
         let at = student::draw(self.centre.len(), rng);
@@ -103,7 +103,7 @@ impl Interpolation {
         self.factor.solve_lower_triangular(&(place - &self.centre))
     }
 
-    /// Cubes of the distances from all places, and the monomials up to the second degree.
+    /// Cubes of the distances from all points, and the monomials up to the second degree.
     fn basis(&self, at: &DVector<f64>) -> DVector<f64> {
         let cubes = self.places.iter().map(|place| (at - place).norm().powi(3));
         let squares = (0..at.len()).flat_map(|i| (0..=i).map(move |j| at[i] * at[j]));

@@ -1,11 +1,11 @@
-//! A stand-in for the posterior that costs microseconds: the quadratic of [`crate::surface::expansion`] with the
+//! A surrogate of the posterior that costs microseconds: the quadratic of [`crate::surface::expansion`] with the
 //! priors, frozen before a chain begins (`docs/method.md` section 5, surrogate move).
 //!
-//! Given the period, the quadratic is a Gaussian in K cos, K sin, the systemic velocity and the stellar parameters;
-//! over the periods it is tabulated. Of eccentric orbits it is one given the shape as well, which is drawn from its
-//! prior; of two planets, given both periods, each tabulated with the other at its best. Where maps are found anew for
-//! each field of spots, the quadratics of some fields are interpolated between (`interpolation`). Its tails are those
-//! of a t distribution, so that nothing it calls improbable is out of reach.
+//! At a given period, the quadratic is a Gaussian in K cos, K sin, the systemic velocity and the stellar parameters;
+//! over the periods it is tabulated. For eccentric orbits it is one at a given shape as well, which is drawn from its
+//! prior; for two planets, at both given periods, each tabulated with the other at its best. Where maps are recomputed
+//! for each field of spots, the quadratics of some fields are interpolated (`interpolation`). Its tails are those of a
+//! t distribution, so that improbable points remain reachable.
 
 mod conditional;
 mod correction;
@@ -30,10 +30,10 @@ pub use proposal::SurrogateMove;
 /// Degrees of freedom of the surrogate's tails.
 const TAIL: f64 = 60.0;
 
-/// Steps of the walk on the surrogate that make one draw of it.
+/// Steps of the walk on the surrogate per draw.
 const WALK: usize = 16;
 
-/// The same where shapes are drawn from their priors, or periods of two planets and fields each by itself.
+/// The same where shapes are drawn from their priors, or periods of two planets and fields independently.
 const LONG_WALK: usize = 96;
 
 /// The surrogate posterior of a parameter space in which K of a planet is free, with phi or the time of a conjunction.
@@ -48,7 +48,7 @@ pub struct Surrogate {
     walk: usize,
     /// Highest ln L over all periods.
     best: f64,
-    /// What differences of ln L are divided by.
+    /// Divisor of differences of ln L.
     temperature: f64,
 }
 
@@ -61,19 +61,18 @@ pub struct Peak {
     pub drop: f64,
 }
 
-/// A place with all that the walk needs to know of it.
+/// A point with the data of the walk.
 #[derive(Clone, Debug)]
 struct Place {
     position: Vec<f64>,
     /// ln of the surrogate density in sampling coordinates.
     log_density: f64,
-    /// ln of the density with which [`Surrogate::propose`] comes here.
+    /// ln of the density with which [`Surrogate::propose`] gives it.
     log_proposal: f64,
 }
 
 impl Surrogate {
-    /// Around `reference`; `None` where the space is not one that it is made for, or the likelihood has no maximum to
-    /// second order.
+    /// Around `reference`; `None` where the space is not supported, or the likelihood has no maximum to second order.
     pub fn new(imager: &Imager, space: &ParameterSpace, reference: &Reference) -> Option<Self> {
         if !is_orbit_free(space) {
             return None;
@@ -81,8 +80,8 @@ impl Surrogate {
         Surrogate::of_expansion(&Expansion::of(imager, reference, &free_stellar(space.free())), space, imager)
     }
 
-    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where the space is not one
-    /// that it is made for, or the likelihood has no maximum.
+    /// From an expansion whose stellar coordinates are those that `space` leaves free; `None` where the space is not
+    /// supported, or the likelihood has no maximum.
     pub fn of_expansion(expansion: &Expansion, space: &ParameterSpace, imager: &Imager) -> Option<Self> {
         if !is_orbit_free(space) {
             return None;
@@ -94,7 +93,7 @@ impl Surrogate {
     fn of(model: LinearModel, space: ParameterSpace, time_base_cycles: f64, temperature: f64) -> Option<Self> {
         let scale = Scale { dimension: space.dimension(), time_base_cycles, temperature };
         let planets = model.planets();
-        // every planet with the others on circles of these periods
+        // every planet with the others on circular orbits of these periods
         let table = |which: usize, beside: &[f64]| {
             let at = |period: f64, temperature: f64| {
                 model.at(&model.circles(|i| if i == which { period } else { beside[i] }), temperature)
@@ -145,13 +144,13 @@ impl Surrogate {
         self.tail(below) + log_prior + self.space.log_jacobian(&theta)
     }
 
-    /// ln of a t distribution's density so far `below` its peak in ln L.
+    /// ln of a t distribution's density this far `below` its peak in ln L.
     fn tail(&self, below: f64) -> f64 {
         let degrees = TAIL + self.space.dimension() as f64;
         -0.5 * degrees * (2.0 * below.max(-0.25 * TAIL) / TAIL).ln_1p()
     }
 
-    /// A place drawn from the tables of periods, the priors of shapes, and the Gaussian (with heavier tails) there.
+    /// A point drawn from the tables of periods, the priors of shapes, and the Gaussian (with heavier tails) there.
     fn propose(&self, rng: &mut dyn RngCore) -> Option<Place> {
         let mut log_proposal = 0.0;
         let mut planets = Vec::with_capacity(self.periods.len());
@@ -172,7 +171,7 @@ impl Surrogate {
         Some(Place { position, log_density, log_proposal: log_proposal + log_linear })
     }
 
-    /// The place at `position`.
+    /// The point at `position`.
     fn place(&self, position: &[f64]) -> Option<Place> {
         let (given, linear) = self.model.split(position);
         let conditional = self.model.at(&given, self.temperature)?;
@@ -188,7 +187,7 @@ impl Surrogate {
     }
 
     /// The end of a walk of independent proposals on the surrogate that begins at `place`: reversible with respect to
-    /// it, and after so many steps all but a draw of it.
+    /// it, and after so many steps nearly an independent draw.
     fn walk(&self, mut place: Place, rng: &mut dyn RngCore) -> Place {
         for _ in 0..self.walk {
             let log_uniform = rng.random::<f64>().ln();
@@ -201,7 +200,7 @@ impl Surrogate {
         place
     }
 
-    /// A draw in sampling coordinates; `None` if the priors leave no place.
+    /// A draw in sampling coordinates; `None` if the priors exclude all.
     pub fn draw(&self, rng: &mut dyn RngCore) -> Option<Vec<f64>> {
         const TRIES: usize = 200;
         let first = (0..TRIES).find_map(|_| self.propose(rng).filter(|place| place.log_density.is_finite()))?;
@@ -209,7 +208,7 @@ impl Surrogate {
     }
 
     /// Maxima over the periods of one planet that lie within `drop` of the best in ln L, highest first, at most so
-    /// many; a second one is at its best.
+    /// many; a second planet is at its best.
     pub fn peaks(&self, drop: f64, most: usize) -> Vec<Peak> {
         let planets = self.model.planets();
         let Some(which) = self.periods.iter().position(Option::is_some) else {
@@ -230,8 +229,8 @@ impl Surrogate {
         chosen.filter_map(peak).collect()
     }
 
-    /// The highest place at these periods, of circles or of some ellipses where shapes are free, with ln L there. One
-    /// planet after the other.
+    /// The highest point at these periods, with circular orbits or some eccentric ones where shapes are free, with ln L
+    /// there. One planet after the other.
     fn shaped(&self, periods: &[f64]) -> Option<(Vec<f64>, f64)> {
         let planets = self.model.planets();
         let mut at = self.model.circles(|i| periods[i]);
@@ -252,10 +251,10 @@ impl Surrogate {
     }
 }
 
-/// Tables of two planets, each with the other at the best of its own: of the two orders, the one that ends higher.
+/// Tables of two planets, each with the other at its best: of the two orders, the one that ends higher.
 type Tables = (f64, Vec<(usize, PeriodTable)>);
 
-/// The table of a planet's periods, by its number and the place of all parameters, with its height.
+/// The table of a planet's periods, by its index and the position of all parameters, with its height.
 type OfPlanet<'a> = dyn Fn(usize, &[f64]) -> Option<(PeriodTable, f64)> + 'a;
 
 fn pair(table: &OfPlanet, centre: &[f64]) -> Option<Tables> {
@@ -275,7 +274,7 @@ fn pair(table: &OfPlanet, centre: &[f64]) -> Option<Tables> {
     }
 }
 
-/// Whether K of every planet that is looked for is free.
+/// Whether K of every planet in the search is free.
 fn is_orbit_free(space: &ParameterSpace) -> bool {
     let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
     let sought = |of: &&Elements| of.all().into_iter().any(is_free);

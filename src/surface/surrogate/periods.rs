@@ -11,10 +11,10 @@ const OVERSAMPLING: f64 = 60.0;
 /// Most cells.
 const MOST_CELLS: usize = 40_000;
 
-/// Where the prior holds period 0, the table ends at this share of the longest.
+/// If the prior includes period 0, the table ends at this fraction of the longest.
 const SHORTEST: f64 = 0.01;
 
-/// Share of the draws that is spread over all periods alike.
+/// Fraction of the draws that is uniform over all periods.
 const EVEN: f64 = 0.02;
 
 /// Probabilities of cells between two frequencies (1 / Porb/Prot).
@@ -22,7 +22,7 @@ const EVEN: f64 = 0.02;
 pub(super) struct PeriodTable {
     lowest: f64,
     width: f64,
-    /// Probability of each cell, and of all up to it.
+    /// Probability of each cell, and the cumulative one.
     probability: Vec<f64>,
     cumulative: Vec<f64>,
     /// Highest ln L at the middle of each cell.
@@ -30,14 +30,14 @@ pub(super) struct PeriodTable {
     fixed: Option<f64>,
 }
 
-/// What a table is made for.
+/// Scale of a table.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     /// Number of parameters.
     pub dimension: usize,
     /// Length of the data.
     pub time_base_cycles: f64,
-    /// What differences of ln L are divided by.
+    /// Divisor of differences of ln L.
     pub temperature: f64,
 }
 
@@ -69,7 +69,7 @@ impl PeriodTable {
         };
         let (mean, sd) = prior.mean_and_sd();
         let (least, most) = prior.bounds();
-        // an unbounded prior is followed as far as it matters, and periods are positive
+        // an unbounded prior is truncated where it becomes negligible, and periods are positive
         let least = if least.is_finite() { least } else { mean - 8.0 * sd };
         let most = if most.is_finite() { most } else { mean + 8.0 * sd };
         let least = if least > 0.0 { least } else { SHORTEST * most };
@@ -80,7 +80,7 @@ impl PeriodTable {
         let period = |i: usize| 1.0 / (lowest + (i as f64 + 0.5) * width);
         let cell = |i: usize| {
             let conditional = at(period(i), temperature)?;
-            // the density 1/K of K cos and K sin, blurred where K is no larger than its error
+            // the density 1/K of K cos and K sin, smoothed where K is no larger than its uncertainty
             let k = conditional.amplitude(first);
             let volume = -0.5 * conditional.log_determinant() - k.ln();
             let prior = prior.log_density(period(i)) + 2.0 * period(i).ln();
@@ -137,7 +137,7 @@ impl PeriodTable {
         (self.probability[cell] / self.width).ln() - 2.0 * period.ln()
     }
 
-    /// The period of the highest ln L, and that.
+    /// The period of the highest ln L, and its value.
     pub fn highest(&self) -> (f64, f64) {
         self.peaks()[0]
     }

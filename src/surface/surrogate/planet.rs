@@ -1,7 +1,7 @@
-//! One planet in the surrogate: which of its coordinates are linear in the velocities, and how the others are drawn.
+//! One planet in the surrogate: the coordinates in which the velocities are linear, and the draws of the others.
 //!
-//! On a circle of which K and phi are free the velocities are linear in `(K cos, K sin)` of the mean longitude at
-//! mid-time, at each period. On an eccentric orbit they are linear in `(K cos(omega), K sin(omega))` at each period,
+//! For a circular orbit with K and phi free the velocities are linear in `(K cos, K sin)` of the mean longitude at
+//! mid-time, at each period. For an eccentric orbit they are linear in `(K cos(omega), K sin(omega))` at each period,
 //! eccentricity e and mean anomaly M at mid-time, and `dx dy d(sqrt(e) cos(omega)) d(sqrt(e) sin(omega))` is half of
 //! `dA dB dM de`. Where the time of a conjunction is a parameter they are linear in K at each period, time and shape,
 //! which are drawn from their priors.
@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 use rand::{Rng, RngCore};
 use std::f64::consts::TAU;
 
-/// What of a planet the velocities are not linear in.
+/// The coordinates of a planet in which the velocities are not linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Nonlinear {
     /// Period over rotation period.
@@ -34,7 +34,7 @@ pub(super) struct Planet {
     /// Position of phi; `None` where a conjunction is a parameter.
     phi: Option<usize>,
     conjunction: Option<(usize, Prior)>,
-    /// Position of the period and the ratio that its unit is, or its value where it is fixed.
+    /// Position of the period and the ratio of its unit, or its value where it is fixed.
     period: Result<(usize, f64), f64>,
     period_prior: Option<Prior>,
     shape: Option<([usize; 2], f64)>,
@@ -75,7 +75,7 @@ impl Planet {
         [self.k].into_iter().chain(self.phi).chain(self.conjunction.map(|c| c.0)).chain(period).chain(shape).collect()
     }
 
-    /// Positions of K and phi, where the orbit is a circle with both free.
+    /// Positions of K and phi, for a circular orbit with both free.
     pub fn plain(&self) -> Option<[usize; 2]> {
         self.phi.filter(|_| self.shape.is_none()).map(|phi| [self.k, phi])
     }
@@ -90,7 +90,7 @@ impl Planet {
         self.phi.is_none().then_some(self.k)
     }
 
-    /// Whether a table of periods says where they are drawn.
+    /// Whether periods are drawn from a table.
     pub fn has_table(&self) -> bool {
         self.phi.is_some()
     }
@@ -104,18 +104,18 @@ impl Planet {
         }
     }
 
-    /// A circle of that period, at the best of the priors in all else.
+    /// A circular orbit of that period, at the best of the priors in all else.
     pub fn circle(&self, period: f64) -> Nonlinear {
         let conjunction_d = self.conjunction.map_or(0.0, |(_, prior)| prior.centre());
         Nonlinear { period, e: 0.0, angle: 0.0, conjunction_d }
     }
 
-    /// Where it is drawn from without a table: its priors.
+    /// The centre of draws without a table: its priors.
     pub fn central_period(&self) -> f64 {
         self.period().map_or_else(|fixed| fixed, |prior| prior.centre())
     }
 
-    /// Shapes that a search tries beside a circle.
+    /// Shapes that a search tries beside the circular one.
     pub fn ellipses(&self, period: f64) -> Vec<Nonlinear> {
         let circle = self.circle(period);
         let Some((_, largest)) = self.shape else { return vec![circle] };
@@ -202,7 +202,7 @@ impl Planet {
         }
     }
 
-    /// All but a period that a table gives (where `period` is given), and ln of the density with which it is drawn.
+    /// All but a period from a table (where `period` is given), and ln of the density with which it is drawn.
     pub fn draw(&self, period: Option<f64>, rng: &mut dyn RngCore) -> (Nonlinear, f64) {
         let mut at = self.circle(period.unwrap_or(0.0));
         if period.is_none() {

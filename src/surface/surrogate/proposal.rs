@@ -1,4 +1,4 @@
-//! The surrogate as a move of the ensemble: the end of a walk on it, accepted by what the exact posterior says.
+//! The surrogate as a move of the ensemble: the end of a walk on it, accepted or rejected by the exact posterior.
 //!
 //! The walk is reversible with respect to the surrogate density q, so that the Hastings factor is `q(current) /
 //! q(proposed)` whatever q is (Liu 2001, *Monte Carlo Strategies in Scientific Computing*, section 9.4.3: surrogate

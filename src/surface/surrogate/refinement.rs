@@ -1,8 +1,8 @@
-//! The surrogate of a density that finds its maps anew for each field of spots: expansions at draws of its own,
-//! interpolated between; more of them until the density accepts what it proposes.
+//! The surrogate of a density that recomputes its maps for each field of spots: expansions at its draws, with
+//! interpolation; more of them until the density accepts its proposals.
 //!
-//! One quadratic in field and velocities together misses how the errors of velocities depend on the spots' lifetime:
-//! two to four of ten proposals are refused, and walkers stay for long where it is too low.
+//! One quadratic in field and velocities together misses the dependence of the velocity uncertainties on the spots'
+//! lifetime: two to four of ten proposals are rejected, and walkers stay for long where it is too low.
 
 use super::Surrogate;
 use super::conditional::LinearModel;
@@ -15,22 +15,22 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Draws of the posterior in each round, on which the surrogate is tried as well.
+/// Draws of the posterior in each round, which also test the surrogate.
 const TRIALS: usize = 64;
 
-/// Draws of a wider one: chains begin there, and tails are known.
+/// Draws of a wider distribution: chains begin there, and it covers the tails.
 const WIDE: usize = 32;
 
-/// How much wider: what differences of ln L are divided by.
+/// Its temperature: the divisor of differences of ln L.
 const TEMPERATURE: f64 = 2.5;
 
-/// Rounds at most.
+/// Largest number of rounds.
 const ROUNDS: usize = 4;
 
-/// A share of proposals accepted that is good enough.
+/// A sufficient fraction of accepted proposals.
 const GOOD: f64 = 0.9;
 
-/// Expansions made between two looks at whether to stop.
+/// Expansions between two checks of the stop flag.
 const AT_ONCE: usize = 32;
 
 /// Expansions in the velocities at the fields of `theta` (physical coordinates); `None` where there is none.
@@ -44,8 +44,8 @@ struct Expanded {
 }
 
 impl Surrogate {
-    /// With expansions `at` fields of spots, and the share of its proposals that are accepted. As it is fitted
-    /// otherwise where that leads to nothing.
+    /// With expansions `at` fields of spots, and the fraction of its proposals that are accepted; the usual fit where
+    /// that fails.
     pub fn refined(self, mid_cycle: f64, density: &dyn LogDensity, at: &AtField, by: &dyn Evaluator) -> (Self, f64) {
         let free = self.space.free();
         let positions: Vec<usize> =
@@ -98,7 +98,7 @@ impl Expanded {
     }
 }
 
-/// Those of the draws that have an expansion; `None` where it was told to stop.
+/// Those of the draws that have an expansion; `None` if told to stop.
 fn expanded(draws: &[Vec<f64>], density: &dyn LogDensity, at: &AtField, by: &dyn Evaluator) -> Option<Vec<Expanded>> {
     let mut all = Vec::with_capacity(draws.len());
     for some in draws.chunks(AT_ONCE) {

@@ -1,5 +1,4 @@
-//! A t distribution, in coordinates in which it is as wide in all directions: proposals with heavier tails than those
-//! of a Gaussian.
+//! A t distribution, in coordinates in which it is isotropic: proposals with heavier tails than those of a Gaussian.
 
 use nalgebra::DVector;
 use rand::{Rng, RngCore};

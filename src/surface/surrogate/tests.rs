@@ -1,4 +1,4 @@
-//! The surrogate against the expansion that it is made of, for every kind of orbit.
+//! The surrogate compared with its expansion, for every kind of orbit.
 
 use super::*;
 use crate::model::{FreeParameter, ParameterValues, Prior};
@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 const MID: f64 = 2.5;
 const SPAN: f64 = 5.0;
 
-/// Twenty velocities with errors of `sigma` and a little of each other's.
+/// Twenty velocities with uncertainties of `sigma` and small correlations.
 fn expansion(sigma: f64, truth: Option<&ParameterValues>) -> Expansion {
     let cycles: Vec<f64> = (0..20).map(|k| SPAN * (f64::from(k) + 0.3 * f64::from(k % 3)) / 20.0).collect();
     let n = cycles.len();
@@ -113,7 +113,7 @@ fn draws_are_those_of_prior_and_likelihood() {
             (theta, weight)
         };
         let wanted: Vec<(Vec<f64>, f64)> = (0..PRIOR).map(|_| weighted(space.sample_prior(&mut rng))).collect();
-        // mean, variance, and of how many draws
+        // mean, variance, and effective number of draws
         let moments = |draws: &[(Vec<f64>, f64)], of: &dyn Fn(&[f64]) -> f64| {
             let total: f64 = draws.iter().map(|(_, w)| w).sum();
             let mean = draws.iter().map(|(theta, w)| w * of(theta)).sum::<f64>() / total;
@@ -122,7 +122,7 @@ fn draws_are_those_of_prior_and_likelihood() {
         };
         let check = |of: &dyn Fn(&[f64]) -> f64, what: &str| {
             let ((a, ..), (b, variance, size)) = (moments(&draws, of), moments(&wanted, of));
-            // draws of a walk are worth a half of independent ones at least
+            // draws of a walk have at least half the weight of independent ones
             let error = (variance * (2.0 / DRAWS as f64 + 1.0 / size)).sqrt();
             assert!((a - b).abs() < 4.0 * error, "{kind:?} {what}: {a} {b} +- {error}");
         };
@@ -158,8 +158,8 @@ fn peaks_lie_at_the_orbits_that_are_there() {
     }
 }
 
-/// A density whose velocities are the better known the longer the spots live, as those of stars are; its expansion at
-/// one lifetime does not know that.
+/// A density whose velocities are the better constrained the longer the spots live, as those of stars are; its
+/// expansion at one lifetime does not include that.
 struct Living {
     space: ParameterSpace,
     observed: DVector<f64>,
@@ -190,7 +190,7 @@ impl Living {
         let (a, t) = ((a - 0.2f64.ln()) / 0.2, (t - 20.0f64.ln()) / 0.5);
         let information = &self.plain.information * (0.8 * t - 0.3 * a).exp();
         let gradient = &information * &self.observed;
-        // as high at the best orbit, whatever the errors
+        // the same height at the best orbit, whatever the uncertainties
         let field = -0.5 * (a * a + t * t - 0.8 * a * t) - 0.1 * t.powi(3).max(-8.0) / (1.0 + t * t);
         let log_likelihood = field - 0.5 * self.observed.dot(&gradient);
         Expansion { log_likelihood, gradient, noise: information.clone(), information, ..self.plain.clone() }
@@ -255,7 +255,7 @@ fn expansions_at_other_fields_make_its_proposals_good() {
     let at = |theta: &[f64]| Some(living.at(theta));
     let (refined, of_many) = plain.refined(MID, &living, &at, &Threads(&living));
     assert!(of_many > 0.9 && of_one < 0.8, "{of_one} {of_many}");
-    // at places that it has not seen, too
+    // also at points that are not in its interpolation
     let mut rng = ChaCha8Rng::seed_from_u64(77);
     let mut off = Vec::new();
     for _ in 0..40 {

@@ -5,7 +5,7 @@ use crate::model::ParameterValues;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-/// A file of which all is in `parts`, but for where it came from.
+/// A file whose content is in `parts`, except its provenance.
 fn file<T: DeserializeOwned>(parts: &[&Value]) -> T {
     let provenance = json!({ "version": "1", "data_sha256": "", "config_sha256": "", "config": {} });
     let all = parts.iter().copied().chain([&provenance]).flat_map(|part| part.as_object().unwrap().clone());
@@ -72,9 +72,9 @@ fn a_search_is_headed_by_its_own_verdict_and_nothing_is_green_beside_a_warning()
     assert_eq!(tone("candidate", &[]), Tone::Doubt);
     assert_eq!(tone("no-planet-needed", &[]), Tone::Neutral);
     let chapter = periodogram("detection", &[]);
-    // of what is usually quoted, only what is known
+    // only known ones among the commonly quoted quantities
     assert_eq!(chapter.tables[0].1.rows.len(), 5);
-    // spots are nowhere, aliases are
+    // no column for spots, one for aliases
     let peaks = chapter.tables[1].1.without_empty_columns();
     assert_eq!(peaks.head, ["period (d)", "*K* (m/s)", "*σ*_{K}", "Δ ln *L*", "FAP", "alias"]);
     assert_eq!(peaks.rows[1], ["1.33", "100", "10", "20.00", "< 1e-4", "of 1 at 1.003/d"]);

@@ -1,23 +1,23 @@
-//! What is lost where velocities are taken for independent: errors of K and chi2 of generalised and of weighted least
+//! The loss where velocities are assumed independent: uncertainties of K and chi2 of generalised and of weighted least
 //! squares.
 
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
-/// A circular orbit of one period, beside a constant velocity, by the diagonal of the covariance alone.
+/// A circular orbit of one period, with a constant velocity, by the diagonal of the covariance alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Loss {
-    /// sigma_K as the diagonal says it, over that with the full covariance; both the roots of the variance averaged
+    /// sigma_K according to the diagonal, over that with the full covariance; both the roots of the variance averaged
     /// over phases.
     pub quoted: f64,
-    /// sigma_K as it is with weights by the diagonal, over the same.
+    /// Actual sigma_K with weights by the diagonal, over the same.
     pub achieved: f64,
-    /// Mean chi2 of the best orbit by the diagonal, a degree of freedom.
+    /// Mean chi2 of the best orbit by the diagonal, per degree of freedom.
     pub reduced_chi2: f64,
 }
 
 impl Loss {
-    /// At velocities of this covariance; `None` where they do not bound the orbit or are too few.
+    /// For velocities with this covariance; `None` where they do not bound the orbit or are too few.
     pub(super) fn new(times_d: &[f64], covariance: &DMatrix<f64>, period_d: f64) -> Option<Self> {
         const FITTED: usize = 3;
         let n = times_d.len();
@@ -34,7 +34,7 @@ impl Loss {
         let weighted = DMatrix::from_fn(n, FITTED, |k, column| weights[k] * design[(k, column)]);
         let best = design.tr_mul(&covariance.clone().cholesky()?.solve(&design)).try_inverse()?;
         let quoted = design.tr_mul(&weighted).try_inverse()?;
-        // from velocities to what is fitted
+        // from velocities to fitted parameters
         let fit = &quoted * weighted.transpose();
         let achieved = &fit * covariance * fit.transpose();
         let rest = DMatrix::identity(n, n) - &design * &fit;
@@ -69,7 +69,7 @@ mod tests {
         assert_eq!(Loss::new(&times()[..3], &DMatrix::identity(3, 3), 4.4), None);
     }
 
-    /// Against weighted least squares of simulated velocities.
+    /// Compared with weighted least squares of simulated velocities.
     #[test]
     fn of_correlated_velocities_it_is_what_simulations_lose() {
         let times = times();
@@ -95,7 +95,7 @@ mod tests {
         }
         let quoted = (&design.transpose() * &design).try_inverse().unwrap();
         let ratio = (variance / (quoted[(0, 0)] + quoted[(1, 1)])).sqrt();
-        // errors of 4000 draws: 1 %
+        // uncertainties of 4000 draws: 1 %
         assert!((loss.achieved / loss.quoted / ratio - 1.0).abs() < 0.04, "{loss:?} {ratio}");
         assert!((loss.reduced_chi2 / chi2 - 1.0).abs() < 0.04, "{loss:?} {chi2}");
         assert!(loss.achieved > 1.0);

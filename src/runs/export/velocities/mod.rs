@@ -1,8 +1,8 @@
 //! The activity-free velocities of a blind search for RV packages: a folder with a table for each of them, the full
-//! covariance, a likelihood of it in Python, and what is lost without it.
+//! covariance, a likelihood for it in Python, and the loss without it.
 //!
-//! Most packages take velocities for independent. Those of a spotted star are not: what spots are taken for one night
-//! they are the next night, and all profiles share the systemic velocity.
+//! Most packages assume independent velocities. Those of a spotted star are not: errors in the spots persist from one
+//! night to the next, and all profiles share the systemic velocity.
 
 mod loss;
 
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Metres in a kilometre.
 const M: f64 = 1000.0;
 
-/// What stands for the instrument in tables that name one, of one data set.
+/// The instrument in tables that name one, for one data set.
 const INSTRUMENT: &str = "dimcmc";
 
 const README: &str = "README.txt";
@@ -89,7 +89,7 @@ impl Velocities {
         Ok(Velocities { times_d, kms: DVector::from_vec(kms), covariance, sets: sets.unwrap_or_default() })
     }
 
-    /// Time, velocity and error in units of the km/s over `unit`, and perhaps the instrument.
+    /// Time, velocity and uncertainty in units of the km/s over `unit`, and optionally the instrument.
     fn table(&self, head: &str, between: &str, unit: f64, instrument: bool) -> String {
         let mut text = head.to_owned();
         for (k, time_d) in self.times_d.iter().enumerate() {
@@ -112,7 +112,7 @@ impl Velocities {
         (0..self.times_d.len()).map(row).collect()
     }
 
-    /// chi2 of no planet, by the full covariance (if it has an inverse) and by its diagonal alone.
+    /// chi2 without a planet, by the full covariance (if it has an inverse) and by its diagonal alone.
     fn chi2(&self) -> [Option<f64>; 2] {
         let full = self.covariance.clone().cholesky().map(|factor| self.kms.dot(&factor.solve(&self.kms)));
         let alone = self.kms.iter().zip(self.covariance.diagonal().iter()).map(|(v, c)| v * v / c).sum();
@@ -144,8 +144,8 @@ fn matrix(path: &Path, n: usize) -> Result<DMatrix<f64>, FileError> {
 /// Rounding of a covariance, relative to its largest numbers.
 const ROUNDING: f64 = 1e-9;
 
-/// That a covariance is one: variances above 0, the same above and below the diagonal, no direction of negative
-/// variance. What is wrong has its line.
+/// Checks that a covariance is valid: positive variances, symmetric, no direction of negative variance. An error has
+/// its line.
 fn positive(covariance: &DMatrix<f64>) -> Result<(), (usize, String)> {
     let variance = |k: usize| covariance[(k, k)];
     let cure = "is this file as `dimcmc periodogram` wrote it? Run the search again";
@@ -165,7 +165,7 @@ fn positive(covariance: &DMatrix<f64>) -> Result<(), (usize, String)> {
             return Err((k + 1, problem));
         }
     }
-    // of correlations, so that all directions count alike
+    // for correlations, so that all directions count equally
     let correlation = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |j, k| {
         covariance[(j, k)] / (variance(j) * variance(k)).sqrt()
     });

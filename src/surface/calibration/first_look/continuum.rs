@@ -1,53 +1,53 @@
-//! Where the continuum beside the line is, on average and in each profile: profiles whose continuum is not at 1, is
-//! tilted, or wanders from one to the next, are fitted by no map.
+//! The level of the continuum beside the line, on average and in each profile: no map fits profiles whose continuum is
+//! not at 1, is tilted, or varies from one to the next.
 
 use super::noise::Scatter;
 use crate::star::observation::{Observations, Profile};
 
-/// The continuum reaches from the end of the line as far again, as for the noise.
+/// The continuum extends beyond the end of the line by as much again, as for the noise.
 const OUTER: f64 = 2.0;
 
-/// Fewest bins on either side of the line whose mean is a level.
+/// Fewest bins on either side of the line for a level.
 const FEWEST_BINS: usize = 4;
 
-/// Levels that scatter by more than chance at this many standard deviations of chi2 wander.
+/// Levels vary where their scatter exceeds chance by this many standard deviations of chi2.
 const WANDERING: f64 = 4.0;
 
-/// A level this many errors away from 1 is another one, if it is away by more than the second number.
+/// A level differs from 1 where it is this many standard errors away, and by more than the second number.
 const ANOTHER_LEVEL: (f64, f64) = (4.0, 5e-4);
 
 /// The continuum on both sides of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Continuum {
-    /// Its mean level, 1 where profiles are in units of it.
+    /// Its mean level, 1 for normalised profiles.
     pub level: f64,
-    /// Standard error of that, by the scatter of the profiles' own levels and of their bins.
+    /// Its standard error, from the scatter of the profiles' levels and of their bins.
     pub level_error: f64,
-    /// Standard deviation of the levels of single profiles about the mean, what their noise explains taken off; `None`
-    /// where the noise explains it all.
+    /// Standard deviation of the levels of single profiles about the mean, their noise subtracted; `None` where the
+    /// noise explains it all.
     pub wandering: Option<f64>,
-    /// Root mean square of the slopes of single profiles (per km/s), what their noise explains taken off; `None` where
-    /// the noise explains it all, or none is as steep as matters.
+    /// Root mean square of the slopes of single profiles (per km/s), their noise subtracted; `None` where the noise
+    /// explains it all, or all slopes are negligible.
     pub tilting: Option<f64>,
 }
 
-/// A slope matters that makes levels of the two sides differ by twice that.
+/// A slope is significant where levels of the two sides differ by twice this.
 const LEAST_SLOPE: f64 = 5e-4;
 
 /// Levels of the two sides of one profile, and the variance of each.
 struct Sides {
     blue: (f64, f64),
     red: (f64, f64),
-    /// Distance of the middles of the two (km/s).
+    /// Distance between the middles of the two (km/s).
     apart_kms: f64,
 }
 
 impl Continuum {
-    /// Of profiles whose line reaches `reach_kms` to either side of `centre_kms`; `None` where hardly any continuum is
-    /// beside it.
+    /// The continuum of profiles whose line extends `reach_kms` to either side of `centre_kms`; `None` where there is
+    /// too little of it.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Option<Self> {
         let scatter: Scatter = observations.profiles.iter().map(|p| Scatter::of(p, centre_kms, reach_kms)).sum();
-        // bins of which several are correlated are so many fewer, and quoted errors may be wrong
+        // correlated bins count as fewer independent ones, and quoted uncertainties may be wrong
         let larger = scatter.ratio(1).unwrap_or(1.0).powi(2) * scatter.correlated_bins(f64::INFINITY);
         let sides = |profile| sides(profile, centre_kms, reach_kms, larger);
         let sides = observations.profiles.iter().map(sides).collect::<Option<Vec<Sides>>>()?;
@@ -67,14 +67,14 @@ impl Continuum {
         Some(Continuum { level, level_error: variance.sqrt(), wandering: excess(&levels), tilting })
     }
 
-    /// Whether the level is another one than 1, beyond doubt and beyond what matters.
+    /// Whether the level differs from 1 significantly and by more than is negligible.
     pub fn is_off(&self) -> bool {
         let off = (self.level - 1.0).abs();
         off > ANOTHER_LEVEL.0 * self.level_error && off > ANOTHER_LEVEL.1
     }
 }
 
-/// Mean levels on either side of the line, their variances `larger` than those by the quoted errors.
+/// Mean levels on either side of the line, with variances `larger` than by the quoted uncertainties.
 fn sides(profile: &Profile, centre_kms: f64, reach_kms: f64, larger: f64) -> Option<Sides> {
     let side = |sign: f64| {
         let distance = |j: usize| sign * (profile.velocity_kms(j) - centre_kms);
@@ -98,12 +98,12 @@ fn mean(values: &[(f64, f64)]) -> (f64, f64) {
     (mean, scatter(values, mean).max(chance) / n)
 }
 
-/// Variance of values about their mean; 0 of one.
+/// Variance of values about their mean; 0 for one value.
 fn scatter(values: &[(f64, f64)], mean: f64) -> f64 {
     values.iter().map(|(x, _)| (x - mean).powi(2)).sum::<f64>() / (values.len() as f64 - 1.0).max(1.0)
 }
 
-/// Standard deviation that the variances do not explain, where chance does not make such a scatter.
+/// Standard deviation in excess of the variances, where it is significant.
 fn excess(values: &[(f64, f64)]) -> Option<f64> {
     let freedom = values.len() as f64 - 1.0;
     let mean = values.iter().map(|(x, _)| x).sum::<f64>() / values.len() as f64;

@@ -1,4 +1,4 @@
-//! Lines of two stars: profiles whose line is much broader at some times than at others.
+//! Double lines: profiles whose line is much broader at some times than at others.
 //!
 //! Spots move the edges of a line by a few percent of its width (3 % on LO Peg, 9 % on simulated stars with the largest
 //! spots); the line of a companion that moves through that of the star, or beside it, by tens of percent.
@@ -7,10 +7,10 @@ use super::mean::MeanProfile;
 use crate::numerics::quantile::{middle, quantile};
 use crate::star::observation::{Observations, Profile};
 
-/// The line ends where it comes up to this part of the depth of the mean profile.
+/// The line ends where its depth is this fraction of that of the mean profile.
 const DEPTH: f64 = 0.25;
 
-/// Widths that differ by more than this part of the usual one are those of two lines.
+/// Widths that differ by more than this fraction of the usual one indicate two lines.
 const DIFFERENCE: f64 = 0.15;
 
 /// Fewest profiles that show it.
@@ -19,7 +19,7 @@ const FEWEST: usize = 4;
 /// Bins are averaged over so many standard deviations of the local line on either side.
 const SMOOTHING: f64 = 1.0;
 
-/// The edges are seen where the noise of an average is below this part of the depth at which they are.
+/// The edges are measured where the noise of an average is below this fraction of the depth there.
 const NOISE: f64 = 0.2;
 
 /// Widths of the line (km/s): a tenth of the profiles have a narrower one, a tenth a broader one.
@@ -32,8 +32,8 @@ pub struct DoubleLines {
 }
 
 impl DoubleLines {
-    /// In profiles in units of their continuum, whose local line is `sigma_kms` wide as the spectrograph shows it;
-    /// `None` where the line is as wide at all times, and where the noise hides its edges.
+    /// For profiles in units of their continuum, whose observed local line has the width `sigma_kms`; `None` where the
+    /// line has the same width at all times, or the noise hides its edges.
     pub fn of(observations: &Observations, sigma_kms: f64) -> Option<Self> {
         let mean = MeanProfile::of(observations).ok()?;
         let half = (SMOOTHING * sigma_kms / mean.step_kms).round() as usize;
@@ -50,7 +50,7 @@ impl DoubleLines {
         (broad_kms - narrow_kms > DIFFERENCE * usual).then_some(DoubleLines { narrow_kms, broad_kms })
     }
 
-    /// What it means.
+    /// The message.
     pub fn text(&self) -> String {
         let DoubleLines { narrow_kms, broad_kms } = self;
         format!(
@@ -61,7 +61,7 @@ impl DoubleLines {
     }
 }
 
-/// Each bin averaged with its neighbours, above the straight line through the ends: continua may be off and tilted.
+/// Each bin averaged with its neighbours, above the straight line through the ends: continua may be offset and tilted.
 fn seen(depth: &[f64], half: usize) -> Vec<f64> {
     let around = |j: usize| &depth[j.saturating_sub(half)..(j + half + 1).min(depth.len())];
     let smooth: Vec<f64> = (0..depth.len()).map(|j| around(j).iter().sum::<f64>() / around(j).len() as f64).collect();
@@ -70,7 +70,7 @@ fn seen(depth: &[f64], half: usize) -> Vec<f64> {
     smooth.iter().enumerate().map(|(j, depth)| depth - first - along(j) * (last - first)).collect()
 }
 
-/// Between the outermost bins that are deeper than `depth`, to a part of a bin; as far as the data reach.
+/// Width between the outermost bins that are deeper than `depth`, interpolated within a bin, limited by the data.
 fn width_kms(profile: &Profile, half: usize, depth: f64) -> Option<f64> {
     let depths: Vec<f64> = profile.intensity.iter().map(|intensity| 1.0 - intensity).collect();
     let smooth = seen(&depths, half);

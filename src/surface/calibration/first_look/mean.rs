@@ -1,7 +1,7 @@
-//! The mean of all profiles, and where its line is.
+//! The mean of all profiles, and the position of its line.
 //!
-//! Profiles that stand between each other's bins, because their VRAD differ, are interpolated linearly; that is good
-//! enough for a first look and used for nothing else.
+//! Profiles whose bins are offset from each other, because their VRAD differ, are interpolated linearly: sufficient for
+//! a first look, and used only there.
 
 use super::LookError;
 use crate::numerics::quantile::middle;
@@ -10,10 +10,10 @@ use crate::star::observation::{Observations, Profile};
 /// Fewest bins that a line must have above half its depth.
 const FEWEST_BINS: usize = 3;
 
-/// A line that is no deeper than that many standard errors of a bin of the mean is no line.
+/// A line shallower than this many standard errors of a bin of the mean is not significant.
 const LEAST_SIGNIFICANCE: f64 = 5.0;
 
-/// Either end of a profile is one such part of it.
+/// The inverse of the fraction of a profile that counts as one of its ends.
 const ENDS: usize = 20;
 
 /// The mean of all profiles, on the bins that all of them have.
@@ -25,11 +25,11 @@ pub struct MeanProfile {
     pub step_kms: f64,
     /// Depth `1 - I` of each bin.
     pub depth: Vec<f64>,
-    /// Standard error of a bin, from the quoted ones (median over the bins).
+    /// Standard error of a bin, from the quoted uncertainties (median over the bins).
     pub sigma: f64,
 }
 
-/// Where the line of a profile crosses half its depth.
+/// Velocities at which the line of a profile crosses half its depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfDepth {
     /// Velocity on the blue side (km/s).
@@ -61,7 +61,7 @@ impl MeanProfile {
         let profiles = &observations.profiles;
         let first = profiles.iter().map(|p| p.first_velocity_kms).fold(f64::NEG_INFINITY, f64::max);
         let end = profiles.iter().map(last).fold(f64::INFINITY, f64::min);
-        // the last bin may be lost to rounding of VRAD, not of this division
+        // rounding of VRAD may lose the last bin, that of this division does not
         let bins = ((end - first) / step + 1e-6).floor();
         if bins.is_nan() || bins < 4.0 {
             return Err(LookError::NothingInCommon);
@@ -102,28 +102,28 @@ impl MeanProfile {
         }
     }
 
-    /// Mean depth of its ends: that of the continuum, wherever its level is, or of the last of the line.
+    /// Mean depth of its ends: of the continuum, whatever its level, or of the outermost part of the line.
     fn at_its_ends(&self) -> f64 {
         let bins = (self.depth.len() / ENDS).max(1);
         let (first, last) = (&self.depth[..bins], &self.depth[self.depth.len() - bins..]);
         0.5 * (middle(first.to_vec()) + middle(last.to_vec()))
     }
 
-    /// Level of the continuum, or of the last of the line.
+    /// Level of the continuum, or of the outermost part of the line.
     pub fn level(&self) -> f64 {
         1.0 - self.at_its_ends()
     }
 
-    /// Error (km/s) of the middle of two crossings by the noise of the mean profile alone.
+    /// Uncertainty (km/s) of the middle of two crossings by the noise of the mean profile alone.
     pub fn centre_error_kms(&self, half_depth: HalfDepth) -> f64 {
         let deepest = self.depth.iter().copied().fold(0.0, f64::max);
         self.sigma / deepest * (self.step_kms * half_depth.half_width_kms()).sqrt()
     }
 
-    /// Where the deepest line crosses half its depth on either side.
+    /// The crossings of half the depth on either side of the deepest line.
     ///
     /// # Errors
-    /// If there is no line, or it runs out of the data.
+    /// If there is no line, or it extends beyond the data.
     pub fn half_depth(&self) -> Result<HalfDepth, LookError> {
         let deepest = (0..self.depth.len()).max_by(|a, b| self.depth[*a].total_cmp(&self.depth[*b])).unwrap_or(0);
         let continuum = self.at_its_ends();

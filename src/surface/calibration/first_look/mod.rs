@@ -1,7 +1,7 @@
-//! A first look at observations, before there is a config: where the line is, how broad and how noisy, what that says
-//! of vsini and systemic velocity, and how much the line moves.
+//! A first look at observations, before there is a config: position, width and noise of the line, the implied vsini and
+//! systemic velocity, and how much the line moves.
 //!
-//! Every number is a start for what the program does afterwards, and says how far it can be trusted.
+//! Every value is a starting point for later steps, and has an uncertainty.
 
 mod continuum;
 mod double;
@@ -18,66 +18,65 @@ pub use unspotted::Unspotted;
 use crate::star::LimbDarkening;
 use crate::star::observation::Observations;
 
-/// What vsini owes to spots, as a share of it and in km/s: 19 of 20 simulated stars are within, polar caps of 40
-/// degrees and all (`tests/method/first_look.rs`).
+/// Uncertainty of vsini by spots, as a fraction of it and in km/s: 19 of 20 simulated stars are within, including those
+/// with polar caps of 40 degrees (`tests/method/first_look.rs`).
 const SPOTS: (f64, f64) = (0.01, 0.3);
 
-/// What the centre owes to spots, as a share of vsini.
+/// Uncertainty of the centre by spots, as a fraction of vsini.
 const CENTRE: f64 = 0.004;
 
-/// How far limb darkening (its linear coefficient) and the width of a local line that is given (a share of it) may be
-/// wrong.
+/// Uncertainty of limb darkening (its linear coefficient) and of the width of a given local line (a fraction of it).
 const DOUBT: (f64, f64) = (0.15, 0.2);
 
-/// A continuum outside of these levels is in another unit, within the second ones in percent.
+/// A continuum outside of these levels has another unit: percent, if within the second ones.
 const LEVELS: std::ops::RangeInclusive<f64> = 0.2..=3.0;
 const PERCENT: std::ops::RangeInclusive<f64> = 50.0..=200.0;
 
-/// The local line as far as it is assumed.
+/// The assumed local line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineModel {
     /// Limb darkening: coefficient of the linear law.
     pub limb_darkening: f64,
     /// Standard deviation (km/s), before the spectrograph.
     pub sigma_kms: f64,
-    /// What the spectrograph adds to it in quadrature (km/s).
+    /// Instrumental broadening, added in quadrature (km/s).
     pub instrumental_sigma_kms: f64,
-    /// Whether the width is a guess and the profiles are asked for it.
+    /// Whether the width is a guess that the profiles refine.
     pub is_guess: bool,
 }
 
-/// What the profiles say by themselves.
+/// Results from the profiles alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstLook {
     /// Time of the first and the last profile (d).
     pub span_d: (f64, f64),
     /// The unspotted star nearest to the mean profile.
     pub unspotted: Unspotted,
-    /// How far its vsini may be wrong (km/s): by spots, limb darkening and the width of the local line.
+    /// Uncertainty of its vsini (km/s): by spots, limb darkening and the width of the local line.
     pub vsini_error_kms: f64,
-    /// How far the width of the local line may be wrong (km/s); `None` where it is given.
+    /// Uncertainty of the width of the local line (km/s); `None` where it is given.
     pub line_sigma_error_kms: Option<f64>,
-    /// How far its centre may be wrong (km/s), by spots.
+    /// Uncertainty of its centre (km/s), by spots.
     pub centre_error_kms: f64,
-    /// Distance (km/s) from the centre at which the line has ended.
+    /// Distance (km/s) from the centre at which the line ends.
     pub reach_kms: f64,
     /// First and last velocity (km/s) that all profiles have.
     pub range_kms: (f64, f64),
     /// The continuum beside the line.
     pub continuum: Option<Continuum>,
-    /// Level of the continuum and its error, where it is another one than 1.
+    /// Level of the continuum and its uncertainty, where it differs from 1.
     pub level: Option<(f64, f64)>,
-    /// Errors of a bin.
+    /// Uncertainties of a bin.
     pub noise: Noise,
 }
 
-/// Why a first look sees nothing.
+/// Errors of a first look.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LookError {
     /// The velocity ranges of the profiles do not overlap.
     #[error("the velocity ranges of the profiles have fewer than 5 bins in common: is VRAD right?")]
     NothingInCommon,
-    /// The numbers are in another unit.
+    /// The data have another unit.
     #[error(
         "the continuum of the profiles is at {level:.4}, and I in units of the continuum is due: {}",
         if *is_percent { "these look like percent, divide I and sigma by 100" }
@@ -98,18 +97,18 @@ pub enum LookError {
     Unresolved {
         /// Standard deviation of the local line (km/s).
         sigma_kms: f64,
-        /// Standard deviation that the spectrograph adds (km/s).
+        /// Instrumental broadening (km/s).
         instrumental_kms: f64,
     },
-    /// Nothing stands out of the noise.
+    /// No line rises above the noise.
     #[error("no absorption line in the mean profile: its largest depth is {depth:.5}, with errors of {sigma:.5}")]
     NoLine {
         /// Largest depth of the mean profile.
         depth: f64,
-        /// Standard error of a bin of it.
+        /// Its standard error per bin.
         sigma: f64,
     },
-    /// The line does not come up to half its depth within the data.
+    /// The data end before the line falls to half its depth.
     #[error("the line runs out of the data, which reach from {from_kms:.1} to {to_kms:.1} km/s after VRAD")]
     LineCut {
         /// First velocity that all profiles have (km/s).
@@ -117,13 +116,13 @@ pub enum LookError {
         /// Last one.
         to_kms: f64,
     },
-    /// There is nothing to fit.
+    /// Too few bins to fit.
     #[error("the deepest line of the mean profile is only {bins} bins wide at half its depth, too few to measure")]
     LineTooNarrow {
         /// Bins above half depth.
         bins: usize,
     },
-    /// The line that is assumed is out of all proportion to the data.
+    /// The assumed line is incompatible with the data.
     #[error(
         "a local line of a standard deviation of {sigma_kms} km/s (with the instrument) is too narrow or too broad \
         for bins of \
@@ -139,13 +138,13 @@ pub enum LookError {
         /// Last one.
         to_kms: f64,
     },
-    /// The fit ran away.
+    /// The fit diverged.
     #[error("the mean profile is not like that of a rotating star: the fit for vsini does not converge")]
     NoRotation,
 }
 
 impl FirstLook {
-    /// A look at `observations`, whose local line is about `line`.
+    /// A first look at `observations`, whose local line is about `line`.
     ///
     /// # Errors
     /// [`LookError`].
@@ -153,7 +152,7 @@ impl FirstLook {
         Self::of(observations, line, true)
     }
 
-    /// The same of profiles whose continuum is at 1, or perhaps `elsewhere`.
+    /// The same for profiles whose continuum is at 1, or perhaps `elsewhere`.
     fn of(observations: &Observations, line: LineModel, elsewhere: bool) -> Result<Self, LookError> {
         let mean = MeanProfile::of(observations)?;
         let level = mean.level();
@@ -174,7 +173,7 @@ impl FirstLook {
             return Ok(FirstLook { level: Some((level, mean.sigma)), ..look });
         }
         let change = |line| fit(line).map(|other| (other.vsini_kms - unspotted.vsini_kms).abs());
-        // towards the middle of what is possible
+        // towards the middle of the allowed range
         let other_limb = if line.limb_darkening > 0.5 { -DOUBT.0 } else { DOUBT.0 };
         let by_limb = change(LineModel { limb_darkening: line.limb_darkening + other_limb, ..line })?;
         let (width_error, by_guess) = unspotted.line_errors_kms;
@@ -200,8 +199,8 @@ impl FirstLook {
         })
     }
 
-    /// Level of the continuum, by the ends of profiles that hold hardly any: another one than 1 with which the mean
-    /// profile looks more like a star than like the one `at_one`.
+    /// Level of the continuum, by the ends of profiles with very little of it: a level other than 1 with which the mean
+    /// profile is more like a star than like the one `at_one`.
     fn level_of_ends(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel, at_one: &Unspotted) -> Option<f64> {
         let star = Unspotted::fit_between_ends(mean, half_depth, line)?;
         (star.residual < at_one.residual && star.is_off(mean)).then_some(1.0 - star.offset)
@@ -209,7 +208,7 @@ impl FirstLook {
 }
 
 impl LineModel {
-    /// Whether the line can be seen in the bins of a profile, and fits into it.
+    /// Whether the bins of a profile resolve the line and contain it.
     fn check(self, mean: &MeanProfile) -> Result<(), LookError> {
         const NARROWEST: f64 = 0.02;
         let (sigma_kms, step_kms, (from_kms, to_kms)) = (self.total_sigma_kms(), mean.step_kms, mean.range_kms());
@@ -219,7 +218,7 @@ impl LineModel {
         }
     }
 
-    /// Standard deviation (km/s) as the spectrograph shows it.
+    /// Standard deviation (km/s) including the instrumental broadening.
     pub fn total_sigma_kms(self) -> f64 {
         self.sigma_kms.hypot(self.instrumental_sigma_kms)
     }

@@ -1,42 +1,42 @@
-//! How noisy the profiles are: what their errors say, and what the continuum beside the line says.
+//! The noise of the profiles: by their quoted uncertainties, and by the continuum beside the line.
 
 use crate::numerics::quantile::middle;
 use crate::star::observation::{Observations, Profile};
 use nalgebra::{DMatrix, DVector};
 use std::cmp::Ordering;
 
-/// Fewest bins of continuum, in all profiles together, whose scatter means something.
+/// Fewest bins of continuum, in all profiles together, for a meaningful scatter.
 const FEWEST_BINS: usize = 30;
 
-/// Fewest bins of continuum of a profile that is counted.
+/// Fewest bins of continuum for a profile to count.
 const FEWEST_IN_PROFILE: usize = 4;
 
-/// Only continuum nearer to the centre than this is asked, in units of the distance at which the line ends: farther out
-/// LSD profiles ripple.
+/// Only continuum nearer to the centre than this is used, in units of the distance at which the line ends: LSD profiles
+/// ripple farther out.
 const OUTER: f64 = 2.0;
 
-/// Errors of a bin in units of the continuum.
+/// Uncertainties of a bin in units of the continuum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// As quoted, median over all bins.
     pub quoted: f64,
-    /// Scatter of the continuum about the mean of its own profile; `None` where there is too little of it.
+    /// Scatter of the continuum about the mean of its profile; `None` where there is too little of it.
     pub scatter: Option<f64>,
 }
 
-/// Bins apart, at most, whose noise may be correlated.
+/// Largest distance in bins at which noise may be correlated.
 const LAGS: usize = 8;
 
-/// How much the continuum of a profile, or of several, scatters about straight lines.
+/// Scatter of the continuum of one or several profiles about straight lines.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scatter {
-    /// Sum of the squares, in units of the quoted errors.
+    /// Sum of the squares, in units of the quoted uncertainties.
     pub chi2: f64,
-    /// Number of bins, less two for every line.
+    /// Number of bins, less two per line.
     pub freedom: usize,
     /// Sum of the products of bins 0, 1, 2, ... apart.
     products: [f64; LAGS + 1],
-    /// Numbers of bins that lines go through.
+    /// Numbers of bins of the lines.
     lengths: Vec<usize>,
 }
 
@@ -52,8 +52,8 @@ impl std::iter::Sum for Scatter {
 }
 
 impl Scatter {
-    /// The continuum of `profile` beside a line that reaches `reach_kms` to either side of `centre_kms`, as far again,
-    /// about a straight line on each side: neither level nor slope counts.
+    /// The continuum of `profile` beside a line that extends `reach_kms` to either side of `centre_kms`, over as much
+    /// again, about a straight line on each side: neither level nor slope counts.
     pub fn of(profile: &Profile, centre_kms: f64, reach_kms: f64) -> Self {
         let side = |sign: f64| {
             let distance = move |j: usize| sign * (profile.velocity_kms(j) - centre_kms);
@@ -64,16 +64,17 @@ impl Scatter {
         [side(-1.0), side(1.0)].into_iter().sum()
     }
 
-    /// Over how many bins noise is correlated for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum
-    /// rho a`, rho the correlation of bins so far apart, as long as it is larger than white noise shows by chance, and
-    /// `a` that of the features. What a profile says of them has an error that is larger by the root of it.
+    /// Number of bins over which noise is correlated for features with a width (standard deviation) of `sigma_bins`:
+    /// `1 + 2 sum rho a`, with rho the correlation at each distance in bins, up to where it no longer exceeds that of
+    /// white noise by chance, and `a` that of the features. Uncertainties derived from a profile are larger by its
+    /// square root.
     pub fn correlated_bins(&self, sigma_bins: f64) -> f64 {
         let overlap = |lag: usize| (-0.25 * (lag as f64 / sigma_bins).powi(2)).exp();
         const CHANCE: f64 = 2.5;
         let mut bins = 1.0;
         for lags in 1..=LAGS {
             let Some((correlation, sd)) = self.correlation(lags) else { break };
-            // lines through a few bins leave little of what is so far apart: NaN breaks off, too
+            // lines through a few bins leave little information at such distances: NaN ends the loop, too
             if !matches!(correlation[lags - 1].partial_cmp(&(CHANCE * sd)), Some(Ordering::Greater)) {
                 break;
             }
@@ -82,9 +83,9 @@ impl Scatter {
         bins
     }
 
-    /// Correlations of bins 1, ..., `lags` apart, none beyond, and the standard deviation of the last in white noise.
-    /// The lines take up some of what is correlated; what the products of their residuals are on average is linear in
-    /// the covariances, and is solved for these.
+    /// Correlations at 1, ..., `lags` bins, no farther, and the standard deviation of the last in white noise. The
+    /// lines absorb part of the correlation; the expected products of their residuals are linear in the covariances,
+    /// and are solved for these.
     fn correlation(&self, lags: usize) -> Option<(Vec<f64>, f64)> {
         let mut lengths = self.lengths.clone();
         lengths.sort_unstable();
@@ -101,13 +102,13 @@ impl Scatter {
         (covariance[0] > 0.0 && correlation.iter().all(|rho| rho.is_finite())).then_some((correlation, sd))
     }
 
-    /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.
+    /// Scatter over quoted uncertainties; `None` below `least` degrees of freedom, and for none at all.
     pub fn ratio(&self, least: usize) -> Option<f64> {
         (self.freedom >= least && self.chi2 > 0.0).then(|| (self.chi2 / self.freedom as f64).sqrt())
     }
 }
 
-/// Of points (x, y, weight) about the straight line that fits them best; nothing of fewer than three.
+/// The scatter of points (x, y, weight) about the straight line that fits them best; zero for fewer than three.
 fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatter {
     let count = points.clone().count();
     if count < 3 {
@@ -122,8 +123,8 @@ fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatte
     Scatter { chi2: products(0), freedom: count - 2, products: std::array::from_fn(products), lengths: vec![count] }
 }
 
-/// Of the sums of products of residuals that are so many bins apart (row) from a straight line through `bins`: their
-/// mean for noise that has a covariance of 1 at one distance (column), and their covariance in white noise.
+/// Of the sums of products of residuals at each distance in bins (row) from a straight line through `bins`: their mean
+/// for noise with a covariance of 1 at one distance (column), and their covariance in white noise.
 fn products(bins: usize, lags: usize) -> [DMatrix<f64>; 2] {
     let line = DMatrix::from_fn(bins, 2, |j, power| (j as f64 - 0.5 * (bins - 1) as f64).powi(power as i32));
     let unit = DMatrix::from_fn(bins, 2, |j, k| line[(j, k)] / line.column(k).norm());
@@ -139,7 +140,7 @@ fn products(bins: usize, lags: usize) -> [DMatrix<f64>; 2] {
 }
 
 impl Noise {
-    /// Errors of profiles whose line reaches `reach_kms` to either side of `centre_kms`.
+    /// Uncertainties of profiles whose line extends `reach_kms` to either side of `centre_kms`.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Self {
         let beside = |profile: &Profile| -> Vec<f64> {
             let distance = |j: usize| (profile.velocity_kms(j) - centre_kms).abs();
@@ -160,7 +161,7 @@ impl Noise {
         }
     }
 
-    /// Scatter over quoted errors; `None` where there is no continuum to tell.
+    /// Scatter over quoted uncertainties; `None` without continuum.
     pub fn ratio(&self) -> Option<f64> {
         self.scatter.map(|scatter| scatter / self.quoted)
     }
@@ -173,8 +174,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Level and slope leave no trace, and of points about a line the scatter is that of a fit by hand: y = 1, 0, 1
-    /// about 2/3.
+    /// Level and slope do not contribute, and the scatter about a line equals that of a fit by hand: y = 1, 0, 1 about
+    /// 2/3.
     #[test]
     fn slopes_do_not_count() {
         let line = |j: usize| 1.3 - 0.01 * j as f64;
@@ -185,7 +186,7 @@ mod tests {
         assert_eq!(about_a_line([(0.0, 1.0, 1.0); 2].into_iter()), Scatter::default());
     }
 
-    /// White noise, and noise x_k = rho x_(k-1) + n_k, whose correlations rho^k add up to (1 + rho) / (1 - rho).
+    /// White noise, and AR(1) noise x_k = rho x_(k-1) + n_k, whose correlations rho^k add up to (1 + rho) / (1 - rho).
     #[test]
     fn noise_that_goes_together_is_seen() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
@@ -202,13 +203,14 @@ mod tests {
         let white: Scatter = (0..100).map(|_| side(0.0, 40)).sum();
         assert_eq!(white.correlated_bins(9.0), 1.0);
         let together: Scatter = (0..100).map(|_| side(0.5, 40)).sum();
-        // what is cut off at the end is a little
+        // the truncated tail is small
         assert!(
             (together.correlated_bins(f64::INFINITY) / 3.0 - 1.0).abs() < 0.15,
             "{}",
             together.correlated_bins(f64::INFINITY)
         );
-        // a few bins of continuum beside the line show no correlation, and 2.5 standard deviations once in 160 times
+        // a few bins of continuum beside the line show no correlation, and chance exceeds 2.5 standard deviations once
+        // in 160 times
         let mut few = |bins: usize| -> Scatter { (0..80).map(|_| side(0.0, bins)).sum() };
         let seen = (0..100).map(|k| few(3 + k % 4).correlated_bins(9.0)).filter(|bins| *bins > 1.0).count();
         assert!(seen <= 5, "{seen}");

@@ -1,11 +1,11 @@
-//! The unspotted star whose profile is most like the mean one: vsini, centre, strength, level of the continuum and,
-//! where nobody gives it, width of the local line, by least squares (Levenberg-Marquardt) through the forward model.
+//! The unspotted star whose profile is nearest to the mean profile: vsini, centre, strength, level of the continuum
+//! and, unless it is given, width of the local line, by least squares (Levenberg-Marquardt) through the forward model.
 //!
-//! Spots that are dark at all phases, polar ones above all, fill the core of the mean profile and leave its flanks
-//! alone; so only the flanks and the continuum beside them are fitted. What remains is good to 1 % and 0.3 km/s of
-//! vsini, and to 0.4 % of vsini for the centre (`tests/method/first_look.rs`), where the width of the local line is
-//! known. Where it is not, it has a weak prior, and the error of vsini holds what it leaves open: the flanks of a slow
-//! rotator show it, those of a fast one hardly. Limb darkening is given.
+//! Spots that are dark at all phases, polar ones in particular, fill the core of the mean profile but not its flanks;
+//! so only the flanks and the continuum beside them are fitted. The result is accurate to 1 % and 0.3 km/s in vsini,
+//! and to 0.4 % of vsini for the centre (`tests/method/first_look.rs`), if the width of the local line is known.
+//! Otherwise the width has a weak prior, and the uncertainty of vsini includes that of the width: the flanks of a slow
+//! rotator constrain it, those of a fast one hardly. Limb darkening is given.
 
 use super::mean::{HalfDepth, MeanProfile};
 use super::{LineModel, LookError};
@@ -21,55 +21,56 @@ const PIXELS: usize = 2000;
 /// Only bins farther than this from the centre are fitted, in units of vsini.
 const FLANK: f64 = 0.7;
 
-/// Only bins nearer than this to it are, in units of the distance at which the line ends.
+/// Only bins nearer than this to it are fitted, in units of the distance at which the line ends.
 const OUTER: f64 = 1.5;
 
-/// The line ends that many standard deviations of the local line beyond vsini: it is 0.1 % deep there.
+/// The line ends this many standard deviations of the local line beyond vsini, where it is 0.1 % deep.
 const REACH_SIGMAS: f64 = 3.0;
 
-/// A line has ended where no more than 2 % of its depth is left, that many standard deviations of the local line beyond
+/// A line has ended where no more than 2 % of its depth is left, this many standard deviations of the local line beyond
 /// vsini; so many bins on either side are then continuum.
 const ENDED_SIGMAS: f64 = 1.5;
 const ENDS: usize = 2;
 
-/// A continuum is off by so many errors of a bin of the mean profile, and by the second number, at least.
+/// An offset continuum is off by at least so many standard errors of a bin of the mean profile, and by the second
+/// number.
 const OFF: (f64, f64) = (10.0, 2e-3);
 
-/// It is so far from the level of the ends at most, in units of its distance from 1.
+/// Its largest distance from the level of the ends, in units of its distance from 1.
 const SEEN: f64 = 0.3;
 
-/// Bins beyond the line from which its continuum can be fitted too.
+/// Fewest bins beyond the line for fitting its continuum too.
 const CONTINUUM_BINS: usize = 6;
 
-/// Passes of choosing the bins and fitting them.
+/// Iterations of choosing the bins and fitting them.
 const PASSES: usize = 4;
 
 /// Standard deviation of the prior of the logarithm of the width of the local line: thermal motion and turbulence of a
 /// cool dwarf, blends of LSD lines.
 const LINE_PRIOR: f64 = 0.5;
 
-/// The local line is within these widths (standard deviations in km/s, before the spectrograph).
+/// Allowed widths of the local line (standard deviations in km/s, before instrumental broadening).
 const LINE_KMS: std::ops::RangeInclusive<f64> = 1.0..=10.0;
 
-/// What spots make of the flanks of the mean profile at least, as a share of its depth.
+/// Least effect of spots on the flanks of the mean profile, as a fraction of its depth.
 const SPOTS_IN_FLANKS: f64 = 0.0015;
 
 /// Most steps of a fit; it takes five to ten.
 const STEPS: usize = 50;
 
-/// A step of less than this (km/s) is the last.
+/// A step of less than this (km/s) ends the fit.
 const TOLERANCE_KMS: f64 = 1e-4;
 
-/// Steps of differences (km/s): large against rounding, small against the line.
+/// Steps of differences (km/s): large compared with rounding, small compared with the line.
 const DIFFERENCE_KMS: f64 = 0.02;
 
 /// The same of the log width of the local line.
 const DIFFERENCE_WIDTH: f64 = 0.01;
 
-/// Damping that a fit begins with, and at which it gives up.
+/// Initial damping of a fit, and the damping at which it gives up.
 const DAMPING: (f64, f64) = (1e-3, 1e9);
 
-/// vsini stays within this factor of where the fit begins.
+/// vsini stays within this factor of its start.
 const FARTHEST: f64 = 10.0;
 
 /// The unspotted star nearest to a mean profile.
@@ -79,16 +80,15 @@ pub struct Unspotted {
     pub vsini_kms: f64,
     /// Velocity of the centre (km/s).
     pub centre_kms: f64,
-    /// Equivalent width (km/s) that the flanks would have without spots; larger than the line's own where there are
-    /// polar ones.
+    /// Equivalent width (km/s) that the flanks would have without spots; larger than that of the line for polar spots.
     pub equivalent_width_kms: f64,
-    /// Depth of what is beyond the line: 0 where the continuum is at 1.
+    /// Depth beyond the line: 0 where the continuum is at 1.
     pub offset: f64,
-    /// Standard deviation of the local line before the spectrograph (km/s): as given, or fitted.
+    /// Standard deviation of the local line before instrumental broadening (km/s): given, or fitted.
     pub line_sigma_kms: f64,
-    /// How far that may be wrong (km/s), and vsini with it; 0 where it is given.
+    /// Uncertainty of that (km/s), and the resulting one of vsini; 0 where it is given.
     pub line_errors_kms: (f64, f64),
-    /// Root mean square of what it leaves of the flanks.
+    /// Residual rms in the flanks.
     pub residual: f64,
 }
 
@@ -96,13 +96,13 @@ impl Unspotted {
     /// The unspotted star nearest to the mean profile of a line whose local width and limb darkening are given.
     ///
     /// # Errors
-    /// If the fit runs away: there is no rotating star in the profile.
+    /// If the fit diverges: the profile does not show a rotating star.
     pub fn fit(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Result<Self, LookError> {
         Self::of(mean, &start(mean, half_depth, line), line, false)
     }
 
     /// The same where the continuum is at another level than 1, and too little of it is beside the line for [`fit`] to
-    /// see that: the ends of the profile are taken for continuum. `None` where the line has not ended there.
+    /// constrain that: the ends of the profile are assumed to be continuum. `None` where the line has not ended there.
     ///
     /// [`fit`]: Self::fit
     pub fn fit_between_ends(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Option<Self> {
@@ -115,7 +115,7 @@ impl Unspotted {
 
     fn of(mean: &MeanProfile, start: &Unspotted, line: LineModel, between_ends: bool) -> Result<Self, LookError> {
         let model = Model::new(line);
-        // first with the line as it is guessed, then with what that leaves of the flanks for the noise of its width
+        // first with the guessed line, then with the residuals in the flanks as the noise for its width
         let mut found = Fit::new(&model, mean, start, (None, between_ends)).run()?;
         for _ in 1..PASSES {
             let noise = line.is_guess.then_some(found.1);
@@ -124,21 +124,20 @@ impl Unspotted {
         Ok(found.0)
     }
 
-    /// Whether the continuum of the mean profile is at another level than 1, as its ends show it.
+    /// Whether the continuum of the mean profile is at another level than 1, according to its ends.
     pub fn is_off(&self, mean: &MeanProfile) -> bool {
         let off = self.offset.abs();
         let beside_ends = (1.0 - self.offset - mean.level()).abs();
         off > OFF.0 * mean.sigma && off > OFF.1 && beside_ends < SEEN * off
     }
 
-    /// Distance (km/s) from the centre at which a line has ended that the spectrograph broadens by
-    /// `instrumental_sigma_kms`.
+    /// Distance (km/s) from the centre at which a line with instrumental broadening `instrumental_sigma_kms` has ended.
     pub fn reach_kms(&self, instrumental_sigma_kms: f64) -> f64 {
         self.vsini_kms + REACH_SIGMAS * self.line_sigma_kms.hypot(instrumental_sigma_kms)
     }
 }
 
-/// A star as wide as the line: at half depth a limb-darkened profile is about 0.85 vsini wide on either side.
+/// A star with the width of the line: at half depth a limb-darkened profile is about 0.85 vsini wide on either side.
 fn start(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Unspotted {
     const HALF_DEPTH: f64 = 0.85;
     const SIGMAS: f64 = 1.18;
@@ -156,14 +155,14 @@ fn start(mean: &MeanProfile, half_depth: HalfDepth, line: LineModel) -> Unspotte
     }
 }
 
-/// An unspotted star, but for vsini, where it is, and the width of its line.
+/// An unspotted star, except for vsini, centre, and the width of its line.
 struct Model {
     grid: SurfaceGrid,
     star: StarSettings,
     line: LineModel,
 }
 
-/// What decides the shape of its profile.
+/// The parameters that determine the shape of its profile.
 #[derive(Clone, Copy)]
 struct Shape {
     vsini_kms: f64,
@@ -192,8 +191,8 @@ impl Model {
         self.line.sigma_kms * log_width.exp()
     }
 
-    /// Depths, for an equivalent width of 1, in the bins of `profile`. A star that rotates as a solid body and has no
-    /// spots looks the same from everywhere.
+    /// Depths, for an equivalent width of 1, in the bins of `profile`. An unspotted star in solid-body rotation looks
+    /// the same at all phases.
     fn depths(&self, shape: Shape, profile: &MeanProfile) -> Vec<f64> {
         let state = StarState {
             rotation: Rotation { omega_eq_rad_d: TAU, domega_rad_d: 0.0 },
@@ -211,8 +210,7 @@ impl Model {
     }
 }
 
-/// A fit of vsini, centre, equivalent width, offset and log width of the line (in this order) to bins that stay the
-/// same.
+/// A fit of vsini, centre, equivalent width, offset and log width of the line (in this order) to fixed bins.
 struct Fit<'a> {
     model: &'a Model,
     mean: &'a MeanProfile,
@@ -220,17 +218,18 @@ struct Fit<'a> {
     weights: Vec<f64>,
     /// 1 where the offset is free, 0 where there is too little continuum.
     offset: f64,
-    /// Variance of a bin against which the prior of the line's width is weighed; `None` where the width is not free.
+    /// Variance of a bin relative to which the prior of the line's width is weighted; `None` where the width is not
+    /// free.
     noise: Option<f64>,
     start: Vector5<f64>,
 }
 
-/// A point on the way of a fit.
+/// A point during a fit.
 struct Point {
     p: Vector5<f64>,
     shape: Vec<f64>,
     residual: Vec<f64>,
-    /// Sum of the squares, the prior's included.
+    /// Sum of the squares, including the prior.
     square: f64,
 }
 
@@ -245,7 +244,7 @@ fn shape(p: &Vector5<f64>) -> Shape {
 }
 
 impl<'a> Fit<'a> {
-    /// Bins in the flanks of the star `around` and beside them; the offset is free where the ends are continuum.
+    /// A fit in the flanks of the star `around` and beside them; the offset is free where the ends are continuum.
     fn new(
         model: &'a Model,
         mean: &'a MeanProfile,
@@ -278,12 +277,12 @@ impl<'a> Fit<'a> {
         Point { p, square, shape, residual }
     }
 
-    /// What the prior of the log width adds to the normal equations.
+    /// The contribution of the log-width prior to the normal equations.
     fn prior_weight(&self) -> f64 {
         self.noise.map_or(0.0, |noise| noise / LINE_PRIOR.powi(2))
     }
 
-    /// The star, and the variance of a bin in its flanks that it does not explain.
+    /// The star, and the residual variance of a bin in its flanks.
     fn run(&self) -> Result<(Unspotted, f64), LookError> {
         let mut here = self.point(self.start);
         let mut damping = DAMPING.0;
@@ -328,7 +327,7 @@ impl<'a> Fit<'a> {
         Ok((star, self.unexplained(&here)))
     }
 
-    /// Standard errors of vsini (km/s), as far as the width of the line leaves it open, and of the log width.
+    /// Standard errors of vsini (km/s) due to the width of the line, and of the log width.
     fn errors(&self, here: &Point) -> (f64, f64) {
         let Some(noise) = self.noise else { return (0.0, 0.0) };
         match self.normal_equations(here).0.try_inverse() {
@@ -340,8 +339,8 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Variance of a bin in the flanks that is not explained. What spots leave there is correlated over the width of
-    /// the local line, and so many bins count for one.
+    /// Residual variance of a bin in the flanks. Residuals from spots are correlated over the width of the local line,
+    /// and so many bins count as one.
     fn unexplained(&self, here: &Point) -> f64 {
         let fitted = self.weights.iter().sum::<f64>();
         let total_kms = self.model.line_sigma_kms(here.p[4]).hypot(self.model.line.instrumental_sigma_kms);
@@ -381,7 +380,7 @@ impl<'a> Fit<'a> {
         }
         normal[(4, 4)] += self.prior_weight();
         right[4] -= self.prior_weight() * here.p[4];
-        // what is not free stays where it is
+        // parameters that are not free stay unchanged
         normal[(3, 3)] += 1.0 - self.offset;
         normal[(4, 4)] += f64::from(u8::from(self.noise.is_none()));
         (normal, right)

@@ -1,18 +1,17 @@
-//! The scatter s of the zero points from the velocities of the profiles, spots marginalised out.
+//! The RV jitter s from the velocities of the profiles, spots marginalised out.
 //!
-//! The image is of profiles with zero points of scatter s0 counted. Its most likely velocities `v = I^-1 g` do not hang
-//! on s0, as velocity and zero point enter the profiles alike, and their covariance is `C_f + (s^2 - s0^2) 1`, where
-//! `C_f = I^-1 (noise + f (I - noise)) I^-1` has unresolved spots f times as large in variance as the entropy expects.
-//! So v has a Gaussian density, from which s follows: uniform in s and in ln f, f integrated out, a velocity that all
-//! profiles share being anything. It is given as the root of the mean of s^2, which is what adds to the variance of a
-//! velocity.
+//! The image counts an RV jitter s0 as noise of the profiles. Its most likely velocities `v = I^-1 g` do not depend on
+//! s0, as velocity and jitter enter the profiles alike, and their covariance is `C_f + (s^2 - s0^2) 1`, where `C_f =
+//! I^-1 (noise + f (I - noise)) I^-1` has unresolved spots f times as large in variance as the entropy expects. So v
+//! has a Gaussian density, from which s follows: uniform in s and in ln f, marginalised over f, with a free velocity
+//! common to all profiles. The estimate is the root of the mean of s^2, which adds to the variance of a velocity.
 //!
-//! Without an orbit in the model a planet is taken for zero points, which hides it. With `A^2` the variance of the
-//! velocities, an orbit of either amplitude N(0, A^2) adds `A^2 X X^t` to their covariance, X its cosine and sine. The
-//! odds for an orbit of any period (uniform in frequency) against none, both hypotheses with s and f integrated over,
-//! are those of the densities; they exceed c by chance, without an orbit, with a probability of at most 1/c. So s is
-//! taken beside the orbit of the highest density where the odds are larger than the inverse of the false-alarm
-//! probability of a candidate.
+//! Without an orbit in the model a planet would be absorbed by the jitter, and hidden. With `A^2` the variance of the
+//! velocities, an orbit with both amplitudes N(0, A^2) adds `A^2 X X^t` to their covariance, X its cosine and sine. The
+//! odds for an orbit of any period (uniform in frequency) against none, both hypotheses marginalised over s and f, are
+//! those of the densities; by chance, without an orbit, they exceed c with a probability of at most 1/c. So s is
+//! estimated together with the orbit of the highest density where the odds are larger than the inverse of the
+//! false-alarm probability of a candidate.
 
 use super::MeasuredJitter;
 use crate::numerics::logarithms::ln_sum;
@@ -28,13 +27,13 @@ use std::f64::consts::TAU;
 /// Sizes of unresolved spots for each factor of ten.
 const SIZES_PER_DECADE: f64 = 2.0;
 
-/// Trial frequencies to each inverse time base.
+/// Trial frequencies per inverse time base.
 const OVERSAMPLING: f64 = 4.0;
 
 /// Trial frequencies that share one matrix product.
 const BLOCK: usize = 128;
 
-/// Smallest s, in units of the least uncertain velocity: no profile tells it from 0.
+/// Smallest s, in units of the least uncertain velocity: the profiles cannot distinguish it from 0.
 const SMALLEST: f64 = 0.02;
 
 /// Largest s, in units of the scatter of the velocities.
@@ -43,13 +42,13 @@ const LARGEST: f64 = 5.0;
 /// Steps in s, relative: for estimates, and for the odds of an orbit.
 const STEPS: (f64, f64) = (0.01, 0.08);
 
-/// Values of s are left out where their density is so many times below the highest (ln of it).
+/// Values of s are omitted where their density is this far below the highest (in ln).
 const NEGLIGIBLE: f64 = 12.0;
 
-/// Rounding leaves a variance of this share of the largest at least.
+/// Rounding limits variances to at least this fraction of the largest.
 const ROUNDING: f64 = 1e-9;
 
-/// A standard deviation of the zero points with its error.
+/// An RV jitter with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scatter {
     /// The standard deviation (km/s).
@@ -58,10 +57,10 @@ pub struct Scatter {
     pub error_kms: f64,
 }
 
-/// What it is beside an orbit.
+/// The jitter with an orbit in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BesideOrbit {
-    /// The scatter.
+    /// The jitter.
     #[serde(flatten)]
     pub scatter: Scatter,
     /// Period of the orbit over the rotation period.
@@ -70,11 +69,11 @@ pub struct BesideOrbit {
     pub k_kms: f64,
     /// ln of the odds for an orbit, of any period, against none.
     pub ln_odds: f64,
-    /// Whether these are large enough for the scatter beside the orbit to be the one that counts.
+    /// Whether these are large enough for the jitter with the orbit to be used.
     pub counts: bool,
 }
 
-/// The velocities for one size of unresolved spots, along the axes of their covariance without zero points.
+/// The velocities for one size of unresolved spots, along the axes of their covariance without jitter.
 struct Size {
     variance: DVector<f64>,
     velocity: DVector<f64>,
@@ -83,14 +82,14 @@ struct Size {
 
 /// Densities of an orbit at the trial frequencies.
 struct Orbits {
-    /// ln of the density at each frequency, sizes of spots and zero points integrated over.
+    /// ln of the density at each frequency, marginalised over sizes of spots and jitter.
     ln_density: Vec<f64>,
     /// The frequency, size of spots and s of the highest density.
     best: (usize, usize, f64),
 }
 
-/// The scatter of the zero points in an `expansion` that has them counted as `counted_kms`; `None` where there are too
-/// few velocities, or they are not bounded.
+/// The RV jitter in an `expansion` that counts it as `counted_kms`; `None` where there are too few velocities, or they
+/// are not bounded.
 pub(super) fn fit(expansion: &Expansion, counted_kms: f64, rotation_period_d: f64) -> Option<MeasuredJitter> {
     let profiles = expansion.profiles();
     if profiles < 3 {
@@ -101,7 +100,7 @@ pub(super) fn fit(expansion: &Expansion, counted_kms: f64, rotation_period_d: f6
     let noise = expansion.covariance_of_best(0.0)?;
     let spots = expansion.covariance_of_best(1.0)? - &noise;
     let noise = noise - DMatrix::identity(profiles, profiles) * counted_kms.powi(2);
-    // what tells nothing of a velocity that all profiles share
+    // directions that do not constrain a velocity common to all profiles
     let apart = contrasts(profiles);
     let velocities = &apart * velocities;
     let [noise, spots] = [noise, spots].map(|covariance| &apart * covariance * apart.transpose());
@@ -129,13 +128,13 @@ fn factors() -> impl Iterator<Item = f64> {
     (0..=places).map(|place| UNRESOLVED_SPOTS.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE))
 }
 
-/// Values from the first to the last of `range`, each larger than the one before by this share.
+/// Values from the first to the last of `range`, each larger than the previous one by this fraction.
 fn steps((first, last): (f64, f64), share: f64) -> Vec<f64> {
     let count = ((last / first).ln() / share).ceil() as usize;
     (0..=count).map(|k| first * (share * k as f64).exp()).collect()
 }
 
-/// The values of s at which orbits are tried: those that matter without one, and all smaller ones.
+/// The values of s at which orbits are tried: those that are likely without one, and all smaller ones.
 fn likely(s: &[f64], ln_density: &[f64], first: f64) -> Vec<f64> {
     let highest = ln_density.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let last = s.iter().zip(ln_density).rev().find(|(_, ln)| **ln > highest - NEGLIGIBLE).map_or(first, |(s, _)| *s);
@@ -145,7 +144,7 @@ fn likely(s: &[f64], ln_density: &[f64], first: f64) -> Vec<f64> {
 /// Root of the mean square of s and its standard deviation, where s has these densities at values of equal ratios.
 fn scatter(s: &[f64], ln_density: &[f64]) -> Scatter {
     let highest = ln_density.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // the steps are s wide
+    // the steps have the width s
     let weights: Vec<f64> = s.iter().zip(ln_density).map(|(s, ln)| s * (ln - highest).exp()).collect();
     let all: f64 = weights.iter().sum();
     let mean = |power: i32| s.iter().zip(&weights).map(|(s, w)| w * s.powi(power)).sum::<f64>() / all;
@@ -153,7 +152,7 @@ fn scatter(s: &[f64], ln_density: &[f64]) -> Scatter {
     Scatter { kms: rounded(second.sqrt()), error_kms: rounded((second - first * first).max(0.0).sqrt()) }
 }
 
-/// The orbit that explains velocities best, and the scatter beside it.
+/// The orbit that explains the velocities best, and the jitter with it.
 fn beside_orbit(
     cycles: &[f64],
     apart: &DMatrix<f64>,
@@ -192,7 +191,7 @@ impl Size {
         Size { variance: eigen.eigenvalues.map(|e| e.max(floor)), velocity, axes: eigen.eigenvectors }
     }
 
-    /// ln of the density of the velocities with zero points of scatter `s`, but for a constant.
+    /// ln of the density of the velocities with an RV jitter `s`, up to a constant.
     fn ln_density(&self, s: f64) -> f64 {
         let term = |(variance, velocity): (&f64, &f64)| {
             let all = variance + s * s;
@@ -201,7 +200,7 @@ impl Size {
         -0.5 * self.variance.iter().zip(&self.velocity).map(term).sum::<f64>()
     }
 
-    /// What an orbit of cosine and sine `along` the axes adds to it, and its semi-amplitude.
+    /// The gain by an orbit with cosine and sine `along` the axes, and its semi-amplitude.
     fn orbit(&self, s: f64, along: &DMatrix<f64>, amplitude2: f64) -> (f64, f64) {
         let weight = self.variance.map(|variance| 1.0 / (variance + s * s));
         let weighted = DMatrix::from_diagonal(&weight) * along;
@@ -245,8 +244,8 @@ impl Orbits {
 }
 
 impl Size {
-    /// What orbits of these cosines and sines, two columns a frequency, add to the density, by frequency and row of the
-    /// `weights`.
+    /// Gains in the density by orbits with these cosines and sines, two columns per frequency, by frequency and row of
+    /// the `weights`.
     fn gains(&self, waves: &DMatrix<f64>, weights: &DMatrix<f64>, amplitude2: f64) -> Vec<Vec<f64>> {
         let along = self.axes.tr_mul(waves);
         let count = along.ncols() / 2;
@@ -263,8 +262,8 @@ impl Size {
     }
 }
 
-/// What two amplitudes of variance `amplitude2`, of which the velocities have this information and gradient, add to the
-/// ln of the velocities' density, and their most likely length.
+/// The gain in ln of the velocities' density by two amplitudes of variance `amplitude2`, given their information and
+/// gradient, and their most likely length.
 fn gain(information: Matrix2<f64>, gradient: Vector2<f64>, amplitude2: f64) -> (f64, f64) {
     let with_prior = information + Matrix2::identity() / amplitude2;
     let Some(covariance) = with_prior.try_inverse() else { return (f64::NEG_INFINITY, 0.0) };
@@ -273,7 +272,7 @@ fn gain(information: Matrix2<f64>, gradient: Vector2<f64>, amplitude2: f64) -> (
     (0.5 * (gradient.dot(&best) - determinant.ln()), best.norm())
 }
 
-/// Cosine and sine of each frequency (orbits a rotation cycle), two columns each.
+/// Cosine and sine of each frequency (orbits per rotation cycle), two columns each.
 fn waves(cycles: &[f64], frequencies: &[f64]) -> DMatrix<f64> {
     let mean = cycles.iter().sum::<f64>() / cycles.len() as f64;
     DMatrix::from_fn(cycles.len(), 2 * frequencies.len(), |k, column| {
@@ -282,7 +281,7 @@ fn waves(cycles: &[f64], frequencies: &[f64]) -> DMatrix<f64> {
     })
 }
 
-/// Orthonormal rows that span all vectors whose entries have a mean of 0 (Helmert's).
+/// Orthonormal rows that span all vectors with a mean of 0 (Helmert's).
 fn contrasts(n: usize) -> DMatrix<f64> {
     DMatrix::from_fn(n - 1, n, |row, column| {
         let size = (row + 1) as f64;
@@ -295,7 +294,7 @@ fn contrasts(n: usize) -> DMatrix<f64> {
     })
 }
 
-/// To three digits: the last bits of a fit mean nothing, and everything after it hangs on them.
+/// Three digits: the last bits of a fit are not significant, and all later results depend on them.
 fn rounded(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
@@ -308,11 +307,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// What zero points are counted as.
+    /// The jitter that is counted.
     const COUNTED_KMS: f64 = 0.3;
 
-    /// Thirty profiles of 0.03 km/s photon noise, zero points of scatter `s`, unresolved spots of thirty times the
-    /// variance that the entropy expects, a velocity that all share, and an orbit.
+    /// Thirty profiles of 0.03 km/s photon noise, an RV jitter `s`, unresolved spots of thirty times the variance that
+    /// the entropy expects, a common velocity, and an orbit.
     fn drawn(rng: &mut ChaCha8Rng, s: f64, k_kms: f64) -> Expansion {
         let n = 30;
         let cycles: Vec<f64> = (0..n).map(|k| 0.31 * k as f64 + rng.random_range(0.0..0.2)).collect();
@@ -354,24 +353,24 @@ mod tests {
             let pull = |found: &MeasuredJitter| (found.value_kms - s) / found.without_planet.error_kms;
             let squares = fits.iter().map(|found| pull(found).powi(2)).sum::<f64>() / fits.len() as f64;
             let mean = fits.iter().map(|found| found.value_kms).sum::<f64>() / fits.len() as f64;
-            // one in 30 profiles knows it to 13 %, sixty of them to 2 %; a mean of squares is above the most likely
-            // value
+            // one of 30 profiles constrains it to 13 %, sixty of them to 2 %; a mean of squares is above the most
+            // likely value
             assert!((mean / s - 1.0).abs() < 0.1 && (0.5..1.5).contains(&squares.sqrt()), "{s}: {mean} {squares}");
             assert!(counted(&fits) <= 2, "{s}: {}", counted(&fits));
         }
     }
 
-    /// Velocities that are exact but for photon noise show little.
+    /// Velocities that are exact except for photon noise show little.
     #[test]
     fn without_zero_points_little_is_found() {
         let fits = fits(0.0, 0.0);
         let square = fits.iter().map(|found| found.value_kms.powi(2)).sum::<f64>() / fits.len() as f64;
-        // 30 profiles know the square of 0.03 to 26 %
+        // 30 profiles constrain the square of 0.03 to 26 %
         assert!(square.sqrt() < 0.02, "{}", square.sqrt());
         assert!(counted(&fits) <= 2);
     }
 
-    /// Beside an orbit of ten standard errors the scatter is what it is without one.
+    /// With an orbit of ten standard errors the jitter is the same as without one.
     #[test]
     fn a_planet_is_not_taken_for_zero_points() {
         let fits = fits(0.1, 10.0 * 0.104 * (2.0f64 / 30.0).sqrt());

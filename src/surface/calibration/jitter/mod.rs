@@ -1,15 +1,14 @@
-//! The zero points of the profiles' velocities: how much they scatter, and how they are counted as noise of the
-//! profiles.
+//! The RV jitter: its size, and how it is counted as noise of the profiles.
 //!
-//! A zero point z of Gaussian scatter s moves a profile by z: to first order its depths change by `z D'`, D' their
-//! derivative with velocity, and integrated out it adds `s^2 D' D'^t` to the covariance of the profile's bins
-//! (`nuisances`). All that follows from the profiles then counts it: images, chi2, orbits, false alarms, chains. D'
-//! must not hold the noise of the profiles, and it must hold the spots, which are as steep as the flanks of the line:
-//! it is that of the model at a first image, in which zero points of the same scatter are counted with the slopes of a
-//! star without spots.
+//! An RV offset z of a profile, with Gaussian jitter s, shifts the profile by z: to first order its depths change by `z
+//! D'`, D' their derivative with velocity, and marginalised over z it adds `s^2 D' D'^t` to the covariance of the
+//! profile's bins (`nuisances`). All results from the profiles then include it: images, chi2, orbits, false-alarm
+//! probabilities, chains. D' must not contain the noise of the profiles, and must contain the spots, which are as steep
+//! as the flanks of the line: it is that of the model at a first image, which counts the same jitter with the slopes of
+//! a star without spots.
 //!
-//! How large s is the profiles say themselves (`fit`), in an image in which zero points are counted as far larger than
-//! photon noise makes velocities uncertain, so that none of them is taken for spots.
+//! The profiles themselves constrain s (`fit`), in an image that counts a jitter far larger than the velocity
+//! uncertainties by photon noise, so that none of it is absorbed by spots.
 
 mod fit;
 
@@ -23,34 +22,33 @@ use crate::surface::static_map::Reference;
 use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
 use serde::{Deserialize, Serialize};
 
-/// Zero points are first counted as this many times what photon noise makes of the velocity of a profile.
+/// The jitter that is counted first, in units of the velocity uncertainty of a profile by photon noise.
 const GENEROUS: f64 = 10.0;
 
-/// Where more is found than is counted, all is done again with this many times as much as was found. Much more is of no
-/// use: where lines are shifted far, their change is no longer linear in the shift.
+/// Where more is found than is counted, the fit is repeated with this many times the result. A much larger factor does
+/// not help: for large shifts of the line the change is no longer linear in the shift.
 const ABOVE_FOUND: f64 = 2.0;
 
-/// Most images of a fit, zero points counted as larger or smaller in each.
+/// Most images of a fit, each with another jitter counted.
 const MOST_IMAGES: usize = 4;
 
 /// Step of the derivative of an unspotted star's depths with velocity (km/s).
 const STEP_KMS: f64 = 0.02;
 
-/// The scatter of the velocity zero points as the profiles say it.
+/// The RV jitter as measured from the profiles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredJitter {
-    /// Standard deviation that counts (km/s): that beside the orbit where this is the case, otherwise that without a
-    /// planet.
+    /// The adopted standard deviation (km/s): that with the orbit if its odds suffice, otherwise that without a planet.
     pub value_kms: f64,
-    /// That of stars without a planet.
+    /// The jitter without a planet.
     pub without_planet: Scatter,
-    /// That beside the circular orbit which explains the velocities best; `None` where too few profiles show one.
+    /// The jitter with the circular orbit that explains the velocities best; `None` where too few profiles show one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beside_orbit: Option<BesideOrbit>,
 }
 
 impl MeasuredJitter {
-    /// Of the profiles of `imager` with the star at `values`; the target of chi2 is per datum.
+    /// Measures it from the profiles of `imager` with the star at `values`; the target of chi2 is per datum.
     ///
     /// # Errors
     /// [`JitterError`].
@@ -61,7 +59,7 @@ impl MeasuredJitter {
         let mut found = with(sd_kms);
         for _ in 1..MOST_IMAGES {
             match &found {
-                // too far for an expansion to second order
+                // too large for an expansion to second order
                 Err(JitterError::Unbounded) => sd_kms *= 0.5,
                 Ok(jitter) if jitter.without_planet.kms > sd_kms => sd_kms = ABOVE_FOUND * jitter.without_planet.kms,
                 _ => break,
@@ -74,14 +72,14 @@ impl MeasuredJitter {
         found
     }
 
-    /// From an image in which zero points are counted as that large.
+    /// From an image that counts this jitter.
     fn with(imager: &Imager, values: ParameterValues, chi2_target: f64, sd_kms: f64) -> Result<Self, JitterError> {
         let counted = ZeroPoints::new(imager, values, chi2_target, sd_kms)?.counted_in(imager.clone());
         let expansion = Expansion::of(&counted, &image(&counted, values, chi2_target)?, &[]);
         fit::fit(&expansion, sd_kms, imager.star.rotation_period_d).ok_or(JitterError::Unbounded)
     }
 
-    /// It in a line.
+    /// One line of text.
     pub fn line(&self) -> String {
         let scatter = |s: &Scatter| format!("{} ± {} km/s", s.kms, s.error_kms);
         let alone = scatter(&self.without_planet);
@@ -101,7 +99,7 @@ impl MeasuredJitter {
     }
 }
 
-/// Why the profiles do not say how large it is.
+/// Why the profiles do not constrain it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum JitterError {
     /// No image.
@@ -112,18 +110,18 @@ pub enum JitterError {
     Unbounded,
 }
 
-/// Zero points that are counted as noise.
+/// An RV jitter that is counted as noise.
 #[derive(Clone, Debug)]
 pub struct ZeroPoints {
-    /// Their standard deviation (km/s).
+    /// Its standard deviation (km/s).
     pub sd_kms: f64,
-    /// How the depths change with velocity.
+    /// Derivatives of the depths with velocity.
     slopes: Vec<f64>,
 }
 
 impl ZeroPoints {
-    /// Of this standard deviation in the profiles of `imager`; the image for their slopes is at `values` and the target
-    /// chi2, per datum.
+    /// A jitter of this standard deviation in the profiles of `imager`; the image for their slopes is at `values` and
+    /// the target chi2, per datum.
     ///
     /// # Errors
     /// If there is no such image.
@@ -139,14 +137,14 @@ impl ZeroPoints {
         Ok(ZeroPoints { sd_kms, slopes })
     }
 
-    /// `imager`, of the same profiles, with them counted.
+    /// `imager`, of the same profiles, with the jitter counted.
     pub fn counted_in(&self, imager: Imager) -> Imager {
         imager.with_zero_points(self.sd_kms, &self.slopes)
     }
 }
 
-/// The image at the target chi2, or as close as it comes before noise is turned into spots. Where zero points of that
-/// size explain all but a star without spots, it is the one at which noise would be.
+/// The image at the target chi2, or as close as possible before noise is turned into spots. Where a jitter of that size
+/// explains everything without spots, it is the one at which noise would be.
 fn image(imager: &Imager, values: ParameterValues, chi2_target: f64) -> Result<Reference, ReferenceError> {
     match Reference::provisional(imager, values, chi2_target) {
         Err(ReferenceError::NothingToFit { .. }) => {
@@ -156,7 +154,7 @@ fn image(imager: &Imager, values: ParameterValues, chi2_target: f64) -> Result<R
     }
 }
 
-/// How the depths of a star without spots change with velocity.
+/// Derivatives with velocity of the depths of a star without spots.
 fn unspotted_slopes(imager: &Imager, values: &ParameterValues) -> Vec<f64> {
     let depths = |h: f64| {
         let mut values = *values;
@@ -167,8 +165,8 @@ fn unspotted_slopes(imager: &Imager, values: &ParameterValues) -> Vec<f64> {
     above.iter().zip(below).map(|(a, b)| (a - b) / (2.0 * STEP_KMS)).collect()
 }
 
-/// What photon noise makes of the velocity of a profile with such slopes (km/s), root mean square; `None` without a
-/// line.
+/// The uncertainty of the velocity of a profile with such slopes by photon noise (km/s), root mean square; `None`
+/// without a line.
 fn photon_error_kms(imager: &Imager, slopes: &[f64]) -> Option<f64> {
     let information: f64 = slopes.iter().zip(&imager.data.inverse_variance).map(|(d, w)| d * d * w).sum();
     let error = (imager.profiles().count() as f64 / information).sqrt();

@@ -1,4 +1,4 @@
-//! Tests of the errors of the field.
+//! Tests of the uncertainties of the field.
 
 use super::*;
 use nalgebra::DVector;
@@ -11,7 +11,7 @@ fn bend() -> DMatrix<f64> {
 fn second_derivatives_are_those_of_a_paraboloid() {
     let height = |moves: &[f64]| {
         let x = DVector::from_column_slice(moves);
-        // with a slope, which second derivatives do not see
+        // with a slope, which second derivatives ignore
         Some(5.0 + 0.4 * x[0] - 0.5 * x.dot(&(bend() * &x)))
     };
     assert!((information(3, height, false).unwrap() - DMatrix::from_diagonal(&bend().diagonal())).amax() < 1e-12);
@@ -30,13 +30,13 @@ fn errors_are_those_of_the_inverse_and_an_open_number_has_none() {
     near(errors.sigma_spot_amplitude, amplitude * inverse[(0, 0)].sqrt());
     near(errors.sigma_spot_slope, slope * inverse[(1, 1)].sqrt());
     near(errors.sigma_spot_lifetime_d, lifetime * inverse[(2, 2)].sqrt());
-    // the slope given, the lifetime open
+    // the slope given, the lifetime unconstrained
     let errors = of(&vec![(0, 0.1), (2, 0.3)], &DMatrix::from_row_slice(2, 2, &[4.0, 0.2, 0.2, 0.1]), &top);
     let near = |found: Option<f64>, expected: f64| assert!((found.unwrap() - expected).abs() < 1e-12, "{errors:?}");
     near(errors.sigma_spot_amplitude, amplitude * 0.5);
     assert_eq!((errors.sigma_spot_slope, errors.sigma_spot_lifetime_d), (None, None));
     assert_eq!(errors.unconstrained, ["spot_lifetime_d"]);
-    // what has no maximum has no errors, nor has what is no number
+    // no uncertainties without a maximum, or for NaN
     for bad in [-1.0, f64::NAN] {
         let errors = of(&vec![(0, 0.1)], &DMatrix::from_element(1, 1, bad), &top);
         let unconstrained = vec!["spot_amplitude".to_owned()];
