@@ -14,8 +14,8 @@ use std::path::PathBuf;
 ///
 /// Maps the star without a planet, then computes the improvement in ln L of a circular orbit at each trial period, with
 /// spot-corrected RVs. K at the best period is also given with each night left out and, with static maps, for a target
-/// chi2 3 % lower and higher. Free systemic velocity and stellar parameters are marginalised within their priors. Writes
-/// rv.csv and covariance.csv (for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, FAP).
+/// chi2 3 % lower and higher. Free systemic velocity and stellar parameters are marginalised within their priors.
+/// Writes rv.csv and covariance.csv (for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, FAP).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
 pub struct Args {
