@@ -177,28 +177,33 @@ def _found(content: Record, factor: float, panel: Any) -> list[tuple[float, floa
     removed, before = content.get("removed"), content.before
     if removed is None and not before.false_alarm_probability < content.false_alarm_probability:
         return []
-    panel.axvline(before.period_d, color=SKY, linestyle="--", linewidth=1.0)
-    text = f"$P$ = {before.period_d:.2f} d"
+    period_d = before.period_d
+    if removed is not None and content.limits:
+        one = content.limits[0]
+        period_d = removed.porb_over_prot * one.period_d / one.porb_over_prot
+    panel.axvline(period_d, color=SKY, linestyle="--", linewidth=1.0)
+    text = f"$P$ = {period_d:.2f} d"
     if removed is not None:
         k_kms = abs(removed.k_kms)
         look = {"color": BLUE, "markeredgecolor": "white", "markersize": 6.5, "zorder": 3}
-        panel.plot(before.period_d, factor * k_kms, "D", **look)
+        panel.plot(period_d, factor * k_kms, "D", **look)
         text += f", $K$ = {speed(k_kms, 0.1 * k_kms)}"
     text = ("subtracted: " if removed is not None else "highest peak: ") + text
     ground = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5}
     low, high = np.log(panel.get_xlim())
-    right = np.log(before.period_d) > 0.5 * (low + high)
+    right = np.log(period_d) > 0.5 * (low + high)
     place = {"xycoords": ("data", "axes fraction"), "xytext": (-5 if right else 5, -5), "textcoords": "offset points"}
     look = {"color": BLUE, "va": "top", "ha": "right" if right else "left", "fontsize": "small", "bbox": ground}
-    panel.annotate(text, (before.period_d, 1.0), **look, **place)
-    return [(before.period_d, np.nan if removed is None else factor * abs(removed.k_kms))]
+    panel.annotate(text, (period_d, 1.0), **look, **place)
+    return [(period_d, np.nan if removed is None else factor * abs(removed.k_kms))]
 
 
 def plan(result: Result, numbers: Arrays) -> Sheet:
     """Uncertainty of K and detectable K at every period, and their medians from night to night."""
     content = result._json("plan.json")
     schedules = content.schedules
-    unit, factor = speeds(numbers["sigma_k_kms"])
+    both = np.concatenate([numbers["sigma_k_kms"], numbers["k95_kms"]])
+    unit, factor = speeds(both[np.isfinite(both)])
     looks = (("sigma_k_kms", "--", 0.9, r"$\sigma_K$"), ("k95_kms", "-", 1.1, "$K$ detected, 95 %"))
 
     def periods(panel: Any) -> None:

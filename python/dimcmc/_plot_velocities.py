@@ -96,8 +96,6 @@ class _Velocities:
     def _of_search(self, found: Record) -> None:
         best = found.best
         self.period_d = best.period_d / best.porb_over_prot
-        if found.get("systemic_velocity") is None and found.get("offset") is not None:
-            self.zero_kms = float(found.offset.velocity_kms)
         self.moments = ("first_moment_kms", "first_moment_sigma_kms")
         known = list(found.get("known_planets") or [])
         is_first = bool(known) and known[0].planet == 1
@@ -106,6 +104,9 @@ class _Velocities:
         self.orbits = [_Orbit({**one["orbit"], "shape": one.get("shape")}) for one in orbits[:2]]
         self.errors = (best.sigma_k_kms, best.get("sigma_porb_over_prot"))
         self.clean, self.sigma = self.numbers["rv_kms"], self.numbers["rv_sigma_kms"]
+        # velocities count from a systemic velocity that is found; relative to a given one, all may be offset alike
+        if found.get("systemic_velocity") is None and found.get("offset") is not None:
+            self.zero_kms = self._mean_residual()
         several = "known planets" if is_first else "best orbit and known planet"
         self.orbit_is = several if len(self.orbits) > 1 else "known planet" if is_first else "best orbit"
         self._events(found)
@@ -132,6 +133,12 @@ class _Velocities:
             if orbit.porb_over_prot > 0.0:
                 total += orbit.velocity_kms(self.cycle_at(times_d))
         return total
+
+    def _mean_residual(self) -> float:
+        """Mean of velocities less orbits (km/s) by their uncertainties, 0 if there is none."""
+        residual = self.clean - self.orbit_kms(self.times_d)
+        known = np.isfinite(residual) & (self.sigma > 0.0)
+        return float(np.average(residual[known], weights=self.sigma[known] ** -2.0)) if known.any() else 0.0
 
     def rings(self, panel: Any, x: Array, y: Array) -> None:
         """Rings around events."""

@@ -31,6 +31,8 @@ class Clock:
 
     def __post_init__(self) -> None:
         times = np.sort(self.times_d[np.isfinite(self.times_d)])
+        if not times.size:
+            raise ValueError("no times to draw")
         if times[0] >= _SMALL_D:
             self.zero_d = float(np.floor(times[0] / _SMALL_D) * _SMALL_D)
             self.label = f"{'BJD' if times[0] > _JULIAN_D else 'time'} − {self.zero_d:.0f} (d)"

@@ -13,7 +13,12 @@ static LOST: Mutex<Option<String>> = Mutex::new(None);
 
 /// Prints results, with control characters escaped and long lines broken.
 pub fn print(text: impl Display) {
-    let lines: Vec<String> = text.to_string().split('\n').map(|line| wrapped(&escaped(line)).into_owned()).collect();
+    // names of files stay in one line, for scripts
+    let broken = |line: &str| match escaped(line) {
+        line if line.starts_with("written: ") => line.into_owned(),
+        line => wrapped(&line).into_owned(),
+    };
+    let lines: Vec<String> = text.to_string().split('\n').map(broken).collect();
     print_bytes(lines.join("\n").as_bytes());
 }
 

@@ -282,7 +282,7 @@ impl Detection {
             Some(peak) => (found.best, found.closed) = (peak, true),
             None => found.close(&*surface, at, report)?,
         }
-        found.co_rotation_penalty = co_rotation_penalty(&found.blind.rows, &found.frequencies);
+        found.co_rotation_penalty = co_rotation_penalty(&found.jitters(), &found.blind.rows, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }

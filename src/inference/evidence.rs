@@ -158,7 +158,11 @@ fn followed(prior: &Prior) -> [f64; 2] {
 /// A prior of what is printed times `factor`.
 fn words(prior: &Prior, factor: f64) -> String {
     let number = |x: f64| {
-        let digits = format!("{:.4}", factor * x);
+        let x = factor * x;
+        if x != 0.0 && x.abs() < 1e-3 {
+            return format!("{x:e}");
+        }
+        let digits = format!("{x:.4}");
         digits.trim_end_matches('0').trim_end_matches('.').to_owned()
     };
     match *prior {

@@ -22,9 +22,26 @@ impl Speeds {
         if largest < Self::SMALL_KMS { Speeds { factor: 1e3, name: "m/s" } } else { Speeds::KMS }
     }
 
-    /// A velocity (km/s) in a column of a table: to 1 m/s, or to 0.001 km/s. `-` where there is none.
+    /// A velocity (km/s) in a column of a table: to 1 m/s, or 0.1 m/s below 10. `-` where there is none.
     pub fn cell(self, kms: Option<f64>) -> String {
-        let digits = if self == Speeds::KMS { 3 } else { 0 };
-        kms.map_or_else(|| "-".to_owned(), |kms| format!("{:.digits$}", self.factor * kms))
+        let digits = |kms: f64| match self == Speeds::KMS {
+            true => 3,
+            false => usize::from(kms.abs() < 0.01),
+        };
+        kms.map_or_else(|| "-".to_owned(), |kms| format!("{:.1$}", self.factor * kms, digits(kms)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_velocities_are_in_metres() {
+        let unit = Speeds::of(&[0.0024, 0.3, f64::INFINITY, f64::NAN]);
+        assert_eq!(unit.name, "m/s");
+        assert_eq!([Some(0.0024), Some(0.3), None].map(|kms| unit.cell(kms)), ["2.4", "300", "-"]);
+        let unit = Speeds::of(&[1.6]);
+        assert_eq!((unit, unit.cell(Some(0.0024))), (Speeds::KMS, "0.002".to_owned()));
     }
 }

@@ -310,7 +310,7 @@ fn caveats(against: &[String]) -> String {
     if against.is_empty() { String::new() } else { format!(" Caveats: {}.", against.join("; ")) }
 }
 
-/// Simulations of a search whose file does not have their number.
+/// Simulations of a search whose file does not have their number: what was usual before files had it.
 pub fn usual_draws() -> usize {
     10_000
 }
@@ -322,7 +322,11 @@ fn chance(p: f64, draws: Option<usize>) -> String {
 /// The limit that so many simulations give, where `p` is extrapolated below it.
 pub fn extrapolated(p: f64, draws: usize) -> Option<String> {
     let limit = 1.0 / draws.max(1) as f64;
-    (p < limit).then(|| format!("{limit:.1e}").replace(".0e", "e"))
+    (p < limit).then(|| {
+        // rounded up: it is a limit
+        let digit = 10f64.powf(limit.log10().floor() - 1.0);
+        format!("{:.1e}", (limit / digit - 1e-9).ceil() * digit).replace(".0e", "e")
+    })
 }
 
 /// A false-alarm probability in words; where it is extrapolated beyond the simulations, an upper limit with the
@@ -363,6 +367,23 @@ mod tests {
     use super::*;
 
     const SIGNAL: Signal = Signal { period_d: 5.0692, sigma_period_d: Some(0.021), k_kms: 0.1034, sigma_k_kms: 0.0108 };
+
+    /// A false-alarm probability below what the simulations resolve is a limit, rounded up.
+    #[test]
+    fn what_simulations_do_not_resolve_is_a_limit() {
+        assert_eq!(false_alarm(3e-4, 1000), "FAP < 1e-3 (extrapolated: 3e-4)");
+        assert_eq!(false_alarm(3e-4, 10_000), "FAP = 3.0e-4");
+        assert_eq!(false_alarm(5e-5, 1_000_000), "FAP = 5.0e-5");
+        assert_eq!(extrapolated(1e-5, 3000).as_deref(), Some("3.4e-4"));
+        assert_eq!(false_alarm(0.0, 10_000), "FAP < 1e-300");
+        let few = Verdict::new(3e-4, 1000, SIGNAL, &[]);
+        assert!(few.sentence.contains("FAP < 1e-3 (extrapolated: 3e-4)"), "{}", few.sentence);
+        // a file without their number has the usual one
+        let mut old = serde_json::to_value(&few).unwrap();
+        old.as_object_mut().unwrap().remove("draws");
+        let old: Verdict = serde_json::from_value(old).unwrap();
+        assert!(old.with(&[]).sentence.contains("FAP = 3.0e-4"));
+    }
 
     #[test]
     fn a_known_planet_is_judged_by_its_own_period() {

@@ -264,15 +264,19 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
         lines.push(("continuum", format!("offset {offset:.1e}, slope {slope:.1e}, equivalent width {width:.2} % rms")));
     }
     let times: Vec<f64> = maps.maps.iter().filter_map(|map| map.time_d).collect();
-    if let [first, .., last] = times[..] {
-        lines.push(("maps", format!("{} from {first:.3} to {last:.3} d (times in {MAP})", times.len())));
+    match times[..] {
+        [] => {}
+        [only] => lines.push(("map", format!("at {only:.3} d"))),
+        [first, .., last] => {
+            lines.push(("maps", format!("{} from {first:.3} to {last:.3} d (times in {MAP})", times.len())));
+        }
     }
     lines
 }
 
 /// A velocity to 1 m/s: in m/s, or from 1 km/s on in km/s.
 fn metres(kms: f64) -> String {
-    speed(kms, 0.01)
+    speed(kms, if kms != 0.0 && kms.abs() < 0.01 { 0.001 } else { 0.01 })
 }
 
 /// Those of a field.

@@ -243,7 +243,7 @@ mod tests {
         let one = noise(|k, _, noise| if k == 7 { 2.0 * noise } else { noise });
         assert!(one.warnings.len() == 1 && one.warnings[0].starts_with("profile 8 (7.0000 d)"), "{:?}", one.warnings);
         let core = noise(|_, j, noise| if (20..40).contains(&j) { 1.5 * noise } else { noise });
-        assert!(core.warnings.iter().any(|w| w.contains("core of the line")), "{:?}", core.warnings);
+        assert!(core.warnings.iter().any(|w| w.contains("line core")), "{:?}", core.warnings);
         let wave = noise(|_, j, noise| noise + (0.5 * j as f64).sin());
         assert!(wave.warnings.iter().any(|w| w.contains("neighbouring bins")), "{:?}", wave.warnings);
     }

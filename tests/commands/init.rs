@@ -60,7 +60,7 @@ fn the_config_is_taken_as_it_is() {
             "--rotation-period",
             "assumed, please check\n",
             "--resolving-power",
-            "note: test fit: evolving maps fit the 11 profiles with chi2 = ",
+            "note: test fit: evolving maps fit the 11 profiles with χ²/N = ",
             "written: star.json\n",
             "  dimcmc map star.json --out map ",
         ],

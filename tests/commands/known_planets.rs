@@ -124,7 +124,7 @@ fn a_known_planet_is_compared_with_offsets_of_nights() {
     let blind = &search["false_alarm"];
     let counted = number(&blind["night_offsets_kms"]);
     assert!(counted > 0.03 && counted < 0.0601 && number(&blind["probability"]) > 0.01, "{blind}");
-    says(&said, &["simulations, RV offsets of nights "]);
+    says(&said, &["simulations with RV offsets of nights of "]);
     // and so does the search beside the highest peak
     let counted = number(&search["second"]["false_alarm"]["night_offsets_kms"]);
     assert!(counted > 0.02 && counted < 0.0601, "{counted}");

@@ -53,6 +53,7 @@ fn both_ways_and_the_closed_form_agree() {
     let desk = desk(0.0);
     let table = limits(&desk, &["--full", "10", "--out", "a"]);
     says(&table, &["K 50 %", "K 95 %", "FAP < 1 %", "full pipeline:", "a: limits.csv, limits.json"]);
+    assert!(table.starts_with("Detection limits: K "), "{table}");
     let file = desk.json("a/limits.json");
     // ten orbits within a factor of 2 of the limit, where the second order of the linearised method and the noise of
     // resampling decide

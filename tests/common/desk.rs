@@ -84,14 +84,15 @@ pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
     command.args(args).current_dir(folder).output().unwrap()
 }
 
-/// No line of prose is longer than 120 characters.
+/// No line is longer than 120 characters, but for tables with a last column beyond 80 and names of files.
 fn lines_fit(args: &[&str], stdout: &[u8]) {
     // these are for other programs
     if ["completions", "schema", "man"].contains(&args[0]) {
         return;
     }
-    let is_long = |line: &&str| line.chars().count() > 120 && !line.trim_start().contains("  ");
-    let is_path = |line: &&str| line.split(' ').any(|word| word.chars().count() > 60);
+    let last_column = |line: &str| line.rfind("  ").map_or(0, |at| line[..at].chars().count() + 2);
+    let is_long = |line: &&str| line.chars().count() > 120 && last_column(line) <= 80;
+    let is_path = |line: &&str| line.starts_with("written: ") || line.split(' ').any(|word| word.len() > 60);
     let printed = std::str::from_utf8(stdout).unwrap();
     let long: Vec<&str> = printed.lines().filter(|line| is_long(line) && !is_path(line)).collect();
     assert!(long.is_empty(), "{args:?}: {long:#?}");

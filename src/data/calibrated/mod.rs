@@ -176,19 +176,20 @@ fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
 /// That the velocities in use end within the line of the star, of each data set.
 fn cut_lines(settings: &Settings, parts: &[Observations]) -> Vec<String> {
     let [vsys_kms, vsini_kms] = [Parameter::Vsys, Parameter::Vsini].map(|parameter| settings.values[parameter]);
-    let of = |part: &Observations| {
+    let of = |(set, part): (&DataSetSettings, &Observations)| {
         let profile = part.profiles.first()?;
         let from = profile.first_velocity_kms;
-        let to = from + (profile.intensity.len() - 1) as f64 * profile.step_kms;
+        let to = from + profile.intensity.len().saturating_sub(1) as f64 * profile.step_kms;
         let cuts = (vsys_kms - from).min(to - vsys_kms) < vsini_kms;
+        let name = if settings.sets.len() > 1 { format!("{}: ", set.name) } else { String::new() };
         cuts.then(|| {
             format!(
-                "the velocities in use, {from:.0} to {to:.0} km/s, end within the line (vsini {vsini_kms:.0} km/s): \
-                line, vsini and limb darkening are poorly constrained; widen observations.velocity_range_kms"
+                "{name}the velocities in use, {from:.0} to {to:.0} km/s, end within the line (vsini {vsini_kms:.0} \
+                km/s): line, vsini and limb darkening are poorly constrained; use a wider velocity range"
             )
         })
     };
-    parts.iter().filter_map(of).collect()
+    settings.sets.iter().zip(parts).filter_map(of).collect()
 }
 
 /// Those `remarks` on profiles that may explain a bad fit, each after `; `.

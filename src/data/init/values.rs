@@ -301,10 +301,12 @@ impl Values {
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
                 // of static maps none are fitted
                 if draft.imaging.objective.properties().has_field {
-                    let most_kms = most_offset_kms(None);
                     let remark = match draft.instrument.name {
-                        Some(_) => "RV offsets of nights; up to twice the stability of the spectrograph".to_owned(),
-                        None => format!("RV offsets of nights, up to {most_kms}: stability unknown; --instrument"),
+                        Some(_) => "RV offsets of nights, up to twice the stability of the spectrograph".to_owned(),
+                        None => format!(
+                            "RV offsets of nights, up to {:.0} m/s as the stability is unknown; --instrument",
+                            1000.0 * most_offset_kms(None)
+                        ),
                     };
                     ledger.note("observations.night_jitter_kms", "fitted", "km/s", Source::Assumed, remark);
                 }

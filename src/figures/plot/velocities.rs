@@ -368,9 +368,14 @@ impl<'a> Series<'a> {
         Series { y, sigma: self.sigma.clone(), ..*self }
     }
 
-    /// Their mean (km/s), 0 for none.
+    /// Mean (km/s) weighted by the uncertainties, 0 if there is none.
     fn mean(&self) -> f64 {
-        self.y.iter().sum::<f64>() / self.y.len().max(1) as f64
+        let weighted = self.y.iter().zip(&self.sigma).filter(|(y, sigma)| y.is_finite() && **sigma > 0.0);
+        let [sum, weight] = weighted.fold([0.0, 0.0], |[sum, weight], (y, sigma)| {
+            let of = sigma.powi(2).recip();
+            [sum + of * y, weight + of]
+        });
+        if weight > 0.0 { sum / weight } else { 0.0 }
     }
 
     /// A subset of them.

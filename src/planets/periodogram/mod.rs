@@ -159,12 +159,11 @@ impl Search {
     }
 }
 
-/// sigma_K at the trial period closest to `Porb = Prot` over its median over periods away from it: how much worse an
-/// orbit is bounded where the star's spots imitate one. `None` where the data bound none there.
-pub fn co_rotation_penalty(rows: &[Row], frequencies: &Frequencies) -> Option<f64> {
+/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is bounded where
+/// the star's spots imitate one. `None` where the data bound none there.
+pub fn co_rotation_penalty(jitters: &Jitters, rows: &[Row], frequencies: &Frequencies) -> Option<f64> {
+    let here = jitters.orbit_at(1.0)?.sigma_k_kms;
     let off = |row: &Row| (row.trial.frequency - 1.0).abs() * frequencies.time_base_cycles;
-    let closest = rows.iter().min_by(|a, b| off(a).total_cmp(&off(b))).filter(|row| off(row) < 1.0)?;
-    let here = closest.trial.orbit?.sigma_k_kms;
     let away = rows.iter().filter(|row| off(row) > 1.0);
     let mut others: Vec<f64> = away.filter_map(|row| Some(row.trial.orbit?.sigma_k_kms)).collect();
     others.sort_by(f64::total_cmp);

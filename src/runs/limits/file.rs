@@ -7,6 +7,7 @@ use crate::data::io::atomic::{WriteError, write, write_json, write_set};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::data::io::saved::Saved;
+use crate::numerics::quantile::middle;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::Search;
 use crate::planets::speeds::Speeds;
@@ -181,17 +182,20 @@ impl LimitsFile {
     /// Median limits over the periods.
     pub fn sentence(&self) -> String {
         let unit = Speeds::of(&self.k_kms);
+        let speed = |kms: f64| format!("{} {}", unit.cell(Some(kms)), unit.name);
+        let (least, most) = (self.k_kms.first().copied(), self.k_kms.last().copied());
         let typical = |of: fn(&Limit) -> Option<f64>| {
-            let mut k: Vec<f64> = self.limits.iter().map(|limit| of(limit).unwrap_or(f64::INFINITY)).collect();
-            k.sort_by(f64::total_cmp);
-            Some(k[k.len() / 2]).filter(|k| k.is_finite())
+            let k = middle(self.limits.iter().map(|limit| of(limit).unwrap_or(f64::INFINITY)).collect());
+            match k.is_finite() {
+                true if least.is_some_and(|least| k <= least) => format!("K < {}", speed(k)),
+                true => format!("K = {}", speed(k)),
+                false => format!("K > {}", speed(most.unwrap_or(f64::NAN))),
+            }
         };
-        let beyond = || format!("above {} {}", unit.cell(self.k_kms.last().copied()), unit.name);
-        let words = |k: Option<f64>| k.map_or_else(beyond, |k| format!("{} {}", unit.cell(Some(k)), unit.name));
         format!(
-            "Detection limits: K = {} at 50 %, {} at 95 % of the phases (medians over {} periods).",
-            words(typical(|limit| limit.k50_kms)),
-            words(typical(|limit| limit.k95_kms)),
+            "Detection limits: {} at 50 %, {} at 95 % of the phases (medians over {} periods).",
+            typical(|limit| limit.k50_kms),
+            typical(|limit| limit.k95_kms),
             self.limits.len()
         )
     }
@@ -199,8 +203,8 @@ impl LimitsFile {
     /// A table of some of the periods, and possible problems.
     pub fn table(&self) -> String {
         let unit = Speeds::of(&self.k_kms);
-        let head = ["period_d", "porb_over_prot", &format!("K 50 % ({})", unit.name), "K 95 %"];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        let [k50, k95] = [50, 95].map(|share| format!("K {share} % ({})", unit.name));
+        let mut rows = vec![["period_d", "porb_over_prot", &k50, &k95].map(str::to_owned).to_vec()];
         let step = self.limits.len().div_ceil(SHOWN).max(1);
         for limit in self.limits.iter().step_by(step) {
             let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
@@ -222,7 +226,7 @@ impl LimitsFile {
             let period_d = orbit.porb_over_prot * self.rotation_period_d();
             let digits = decimals(0.01 * period_d);
             text += &format!(
-                "Subtracted: P = {period_d:.digits$} d, K = {}, {}\n",
+                "Subtracted: P = {period_d:.digits$} d, K = {} (highest peak: {})\n",
                 speed(-orbit.k_kms, 0.1 * orbit.k_kms.abs()),
                 false_alarm(false_alarm_probability, draws)
             );

@@ -222,8 +222,8 @@ impl PlanFile {
 
     fn comparison(&self) -> String {
         let unit = unit(self.schedules.iter().filter_map(ScheduleRecord::whole));
-        let sigma = format!("sigma_K ({})", unit.name);
-        let head = ["schedule", "nights", "profiles", "time base (d)", &sigma, "K 50 %", "K 95 %"];
+        let [sigma, k50, k95] = HEADS.map(|head| format!("{head} ({})", unit.name));
+        let head = ["schedule", "nights", "profiles", "time base (d)", &sigma, &k50, &k95];
         let row = |schedule: &ScheduleRecord| {
             let whole = schedule.whole();
             let count = |number: fn(&AfterRecord) -> usize| whole.map_or_else(|| "-".into(), |w| number(w).to_string());
@@ -315,8 +315,8 @@ impl ScheduleRecord {
         }
         text.push('\n');
         let unit = unit(&self.after);
-        let sigma = format!("sigma_K ({})", unit.name);
-        let head = ["nights", "profiles", &sigma, "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
+        let [sigma, k50, k95] = HEADS.map(|head| format!("{head} ({})", unit.name));
+        let head = ["nights", "profiles", &sigma, &k50, &k95].map(str::to_owned).to_vec();
         let row = |after: &AfterRecord| {
             let counts = [after.nights, after.profiles].map(|n| n.to_string());
             let numbers = [after.sigma_k_kms, after.k50_kms, after.k95_kms].map(|k| unit.cell(k));
@@ -324,7 +324,7 @@ impl ScheduleRecord {
         };
         text += &aligned(&std::iter::once(head).chain(self.after.iter().map(row)).collect::<Vec<_>>());
         text += "medians over all periods\n\n";
-        let head = ["period_d", &sigma, "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
+        let head = ["period_d", &sigma, &k50, &k95].map(str::to_owned).to_vec();
         let row = |at: &ExpectedRecord| {
             let numbers = [at.sigma_k_kms, at.k50_kms, at.k95_kms].map(|k| unit.cell(k));
             std::iter::once(format!("{}", at.period_d)).chain(numbers).collect()
@@ -413,6 +413,9 @@ impl Choice {
         )
     }
 }
+
+/// Heads of tables.
+const HEADS: [&str; 3] = ["sigma_K", "K 50 %", "K 95 %"];
 
 /// The unit of K in tables of these.
 fn unit<'a>(after: impl IntoIterator<Item = &'a AfterRecord>) -> Speeds {

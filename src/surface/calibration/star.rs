@@ -101,7 +101,8 @@ fn is_at_bound(prior: &StarPrior, value: f64) -> bool {
     Parameter::REGIONS.contains(&prior.parameter) && (is_low || value > high - near)
 }
 
-/// Full width at half maximum of the line of active regions (km/s), where it exceeds that of every profile.
+/// Full width at half maximum of the line of active regions (km/s), where it exceeds the velocity range of every
+/// profile.
 pub fn too_wide_kms(imager: &Imager, star: &StarSettings) -> Option<f64> {
     let widest = |set: &Seen| {
         let bins = set.sampling.profiles.iter().map(|profile| profile.2).max().unwrap_or(0);
