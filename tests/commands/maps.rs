@@ -194,7 +194,7 @@ fn what_makes_no_sense_is_one_line() {
     assert_eq!(output.status.code(), Some(2));
     desk.set("/imaging/objective", json!("entropy"));
     let said = desk.refusal(&["map", CONFIG, "--out", "maps", "--times", "1"]);
-    says(&said, &["--times: the map does not change", "imaging.objective", "\"marginal-likelihood\""]);
+    says(&said, &["--times: static maps have no times", "imaging.objective", "\"marginal-likelihood\""]);
     // a static map is of all times
     desk.succeed(&["map", CONFIG, "--out", "map"]);
     let map: MapFile = serde_json::from_value(desk.json("map/map.json")).unwrap();

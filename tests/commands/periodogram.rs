@@ -35,7 +35,7 @@ fn the_planet_of_the_demo_is_found() {
     let desk = demo();
     let table = desk.succeed(&["periodogram", "config.json", "--out", "a", "--eccentric", "--planets", "2"]);
     says(&table, &["k_kms", "truth", "FAP", "delta_ln_l", "eccentric orbit", "second planet"]);
-    says(&table, &["at P = P_rot", "a: rv.csv, covariance.csv, periodogram.csv, periodogram_2.csv, periodogram.json"]);
+    says(&table, &["At P = P_rot", "a: rv.csv, covariance.csv, periodogram.csv, periodogram_2.csv, periodogram.json"]);
     says(&table, &["t_conjunction_d: ", "(planet in front) nearest to the middle of the data"]);
 
     let found = desk.json("a/periodogram.json");

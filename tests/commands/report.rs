@@ -51,7 +51,7 @@ fn a_run_has_a_page() {
     manifest["config"]["sampler"]["ess"] = json!(1_000_000);
     desk.write("sample/manifest.json", &manifest.to_string());
     desk.succeed(&["report", "sample", "--out", "short.html"]);
-    assert!(desk.read("short.html").contains("The chain has not converged"));
+    assert!(desk.read("short.html").contains("Not converged; criterion"));
 }
 
 /// What cannot be computed there, such as chi2 outside of the line, is null in the file.

@@ -103,16 +103,21 @@ fn lines_fit(args: &[&str], stdout: &[u8]) {
 pub fn text(bytes: &[u8]) -> String {
     let printed = String::from_utf8(bytes.to_vec()).unwrap();
     let mut lines: Vec<String> = Vec::new();
-    let mut before = 0;
+    let (mut before, mut hanging) = (0, 0);
     for line in printed.split('\n') {
         let length = line.chars().count();
+        let indent = line.chars().take_while(|c| *c == ' ').count();
         let word = line.split_whitespace().next().map_or(0, |word| word.chars().count());
         match lines.last_mut() {
-            Some(last) if line.starts_with("  ") && word > 0 && before <= 120 && before + 1 + word > 120 => {
+            Some(last) if indent == hanging && word > 0 && before <= 120 && before + 1 + word > 120 => {
                 last.push(' ');
                 last.push_str(line.trim_start());
             }
-            _ => lines.push(line.to_owned()),
+            _ => {
+                let column = line.rfind("  ").map_or(0, |at| line[..at].chars().count() + 2);
+                hanging = if column > indent { column } else { indent + 2 };
+                lines.push(line.to_owned());
+            }
         }
         before = length;
     }

@@ -6,8 +6,8 @@
 //! sin omega)`, which are regular at e = 0.
 
 use super::frequencies::Frequencies;
-use super::orbits::{SIGMA_OF_UNKNOWN_PHASE, mid_cycle};
-use super::peaks::{Peak, parameters, steps};
+use super::orbits::{SIGMA_OF_UNKNOWN_PHASE, at, mid_cycle};
+use super::peaks::{Peak, parameters, refined, steps};
 use super::refine::{Maximum, Model};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::kepler::{mean_anomaly, true_anomaly};
@@ -123,7 +123,10 @@ pub fn keplerian(quadratic: &VelocityQuadratic, frequencies: &Frequencies, peak:
     let starts = [Some(circle), best_of_grid(quadratic, 1.0 / peak.porb_over_prot)];
     let maxima = starts.into_iter().flatten().filter_map(|start| model.climb(quadratic, start));
     let maximum = maxima.max_by(|a, b| a.delta_ln_l.total_cmp(&b.delta_ln_l))?;
-    Some(named(&quadratic.cycles, &maximum, peak.orbit.delta_ln_l))
+    // the peak's height may be of other maps
+    let start = Peak { orbit: at(quadratic, 1.0 / peak.porb_over_prot).orbit?, ..*peak };
+    let circle = refined(quadratic, frequencies, &start).orbit.delta_ln_l;
+    Some(named(&quadratic.cycles, &maximum, circle))
 }
 
 /// The orbit at a maximum, its standard errors to first order in the coordinates.
@@ -197,8 +200,7 @@ fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
 #[cfg(test)]
 mod tests {
     use super::super::frequencies::FrequencySettings;
-    use super::super::orbits::at;
-    use super::super::peaks::refined;
+    use super::super::orbits::CircularOrbit;
     use super::super::sample::{self, uneven};
     use super::*;
 
@@ -229,6 +231,10 @@ mod tests {
         let orbit = keplerian(&quadratic, &frequencies, &peak).unwrap();
         assert!(orbit.eccentricity < 1e-4 && orbit.gain_over_circle.abs() < 1e-6, "{orbit:?}");
         assert!((orbit.k_kms - 0.05).abs() < 1e-6);
+        // a height of other maps is none of this likelihood
+        let lower = Peak { orbit: CircularOrbit { delta_ln_l: peak.orbit.delta_ln_l - 10.0, ..peak.orbit }, ..peak };
+        let orbit = keplerian(&quadratic, &frequencies, &lower).unwrap();
+        assert!(orbit.gain_over_circle.abs() < 1e-6, "{orbit:?}");
     }
 
     #[test]
