@@ -261,10 +261,11 @@ def table(args):
     default = [row for row in rows if row["setting"] == "default"]
     without = [row for row in default if not row["planet"]]
     planets = [row for row in default if row["planet"]]
+    unflared = [row for row in rows if row["setting"] == UNFLARED]
     text = f"{len(without)} stars without and {len(planets)} with a planet; {len(failed)} failed.\n\n"
     sections = {
         "Without a planet": false_alarms(without),
-        "With a planet of 150 m/s": planets_found(planets, without, [row for row in rows if row["setting"] == UNFLARED]),
+        "With a planet of 150 m/s": planets_found(planets, without, unflared),
         "Stars of no effect, searched otherwise": settings(rows),
         "Flares, and the same stars without": flares(rows),
     }

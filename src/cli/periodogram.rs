@@ -12,10 +12,11 @@ use std::path::PathBuf;
 
 /// Blind search for a planet over period, marginalised over the star's spots
 ///
-/// Maps the star without a planet, then computes the improvement in ln L of a circular orbit at each trial period, with
-/// spot-corrected RVs. K at the best period is also given with each night left out and, with static maps, for a target
-/// chi2 3 % lower and higher. Free systemic velocity and stellar parameters are marginalised within their priors.
-/// Writes rv.csv and covariance.csv (for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, FAP).
+/// Maps the star without a planet, then computes the improvement in ln L of a circular orbit at each trial period,
+/// with spot-corrected RVs. K at the best period is also given with each night left out and, with static maps, for a
+/// target chi2 3 % lower and higher. Free systemic velocity and stellar parameters are marginalised within their
+/// priors. Writes rv.csv and covariance.csv (for any RV package), periodogram.csv and periodogram.json (best orbit,
+/// peaks, FAP).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
 pub struct Args {
