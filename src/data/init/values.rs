@@ -304,7 +304,7 @@ impl Values {
                     let remark = match draft.instrument.name {
                         Some(_) => "RV offsets of nights, up to twice the stability of the spectrograph".to_owned(),
                         None => format!(
-                            "RV offsets of nights, up to {:.0} m/s as the stability is unknown; --instrument",
+                            "RV offsets of nights, up to {:.0} m/s as no spectrograph is named; --instrument",
                             1000.0 * most_offset_kms(None)
                         ),
                     };
