@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from . import _core, _plots, _text
 from ._config import Config
 from ._observations import Observations
+from ._symbols import speed
 
 __all__ = [
     "Comparison",
@@ -439,7 +440,8 @@ class Maps(Result):
         fit = self.summary
         per_datum = f"χ²/N = {fit.chi2_per_datum:.4f}"
         lines = [("chi2", f"{fit.chi2:.2f} for {fit.data} data in {fit.profiles} profiles ({per_datum})")]
-        lines.append(("RV observed", f"{fit.observed_rv_rms_kms:.4f} km/s rms"))
+        rms_kms = fit.observed_rv_rms_kms
+        lines.append(("RV observed", f"{speed(rms_kms, 0.001 if 0.0 < rms_kms < 0.01 else 0.01)} rms"))
         return _labelled([*lines, *(("warning", text) for text in fit.get("warnings", []))])
 
     @property
