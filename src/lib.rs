@@ -171,6 +171,7 @@ pub use figures::printed::printed;
 pub use figures::report::{is_page as is_report, report};
 pub use inference::search::{Found, Progress};
 pub use model::{Parameter, Prior};
+pub use numerics::text::broken as broken_lines;
 pub use planets::occurrence::RatePrior;
 pub use planets::periodogram::FrequencySettings;
 pub use planets::verdict::{Finding, Remark, Signal, Verdict};

@@ -135,7 +135,7 @@ class Result:
 
     def __init__(self, folder: Path, text: str, scratch: Scratch | None = None) -> None:
         self.folder = folder
-        self._text = text
+        self._text = _core.broken(text)
         self._scratch = scratch
 
     @classmethod
@@ -157,7 +157,7 @@ class Result:
             raise ValueError(f"{folder}: no {cls._FILE or 'results'}, which dimcmc.{cls.__name__} reads")
         text = _core.printed(os.fspath(folder), cls._FILE)
         opened = cls(folder, "")
-        opened._text = opened._summarised() if text is None else text
+        opened._text = _core.broken(opened._summarised() if text is None else text)
         return opened
 
     @classmethod
@@ -370,7 +370,7 @@ class Simulation(Result):
         if not cls._is_in(folder):
             raise ValueError(f"{folder}: no truth.json that dimcmc.{cls.__name__} reads")
         opened = cls(folder, "")
-        opened._text = opened._summarised()
+        opened._text = _core.broken(opened._summarised())
         return opened
 
     @classmethod

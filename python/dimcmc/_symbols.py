@@ -49,7 +49,7 @@ _UNITS = {"rad / d": "rad/d", "km / s": "km/s", "m / s": "m/s", "deg": "°"}
 _IN_DAYS = {"porb_over_prot": "period_d", "porb2_over_prot": "period2_d"}
 _AMPLITUDES = ("k_kms", "k2_kms")
 # velocities up to this are drawn in m/s (km/s)
-_SMALL_KMS = 1.5
+_SMALL_KMS = 1.0
 
 
 @dataclass(frozen=True)

@@ -285,6 +285,12 @@ pub fn printed(py: Python, folder: PathBuf, file: &str) -> PyResult<Option<Strin
     Ok(text.map(|text| text.trim_end().to_owned()))
 }
 
+/// A text as the program prints it, long lines broken.
+#[pyfunction]
+pub fn broken(text: &str) -> String {
+    dimcmc::broken_lines(text)
+}
+
 /// Options of `plan`: shortest and longest period, fixed; maps, draws, seed.
 type PlanOptions = (Option<f64>, Option<f64>, bool, usize, usize, u64);
 

@@ -39,6 +39,7 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
         wrap_pyfunction!(calls::report, module)?,
         wrap_pyfunction!(calls::is_report, module)?,
         wrap_pyfunction!(calls::printed, module)?,
+        wrap_pyfunction!(calls::broken, module)?,
         wrap_pyfunction!(calls::plan, module)?,
         wrap_pyfunction!(calls::optimise, module)?,
         wrap_pyfunction!(calls::survey, module)?,

@@ -14,15 +14,13 @@ import pytest
 from conftest import SMALL
 
 import dimcmc
-from printed import whole_lines
 
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     """The command line that comes with the package."""
     program = shutil.which("dimcmc", path=sysconfig.get_path("scripts"))
     assert program, "the package is not installed"
-    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
-    return subprocess.CompletedProcess(done.args, done.returncode, whole_lines(done.stdout), done.stderr)
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -17,7 +17,6 @@ from conftest import SMALL
 from numpy.typing import NDArray
 
 import dimcmc
-from printed import whole_lines
 
 # the objective with the quicker test fit
 QUICK: Literal["spottedness"] = "spottedness"
@@ -33,7 +32,7 @@ def command(*arguments: object, cwd: Path) -> str:
     call = [sys.executable, "-m", "dimcmc", *(str(argument) for argument in arguments)]
     ended = subprocess.run(call, capture_output=True, text=True, cwd=cwd, check=False)
     assert ended.returncode == 0, ended.stderr
-    return whole_lines(ended.stdout)
+    return ended.stdout
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 //! failure once the command has ended.
 
 use super::Failure;
-use crate::numerics::text::{escaped, wrapped};
+use crate::numerics::text::{broken, escaped};
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -13,13 +13,7 @@ static LOST: Mutex<Option<String>> = Mutex::new(None);
 
 /// Prints results, with control characters escaped and long lines broken.
 pub fn print(text: impl Display) {
-    // names of files stay in one line, for scripts
-    let broken = |line: &str| match escaped(line) {
-        line if line.starts_with("written: ") => line.into_owned(),
-        line => wrapped(&line).into_owned(),
-    };
-    let lines: Vec<String> = text.to_string().split('\n').map(broken).collect();
-    print_bytes(lines.join("\n").as_bytes());
+    print_bytes(broken(&text.to_string()).as_bytes());
 }
 
 /// Prints a line of results.
@@ -46,7 +40,7 @@ pub fn error(message: impl Display) {
 
 /// Prints a note on the results on stderr.
 pub fn note(message: impl Display) {
-    aside(&wrapped(&format!("note: {}", escaped(&message.to_string()))));
+    aside(&broken(&format!("note: {}", escaped(&message.to_string()))));
 }
 
 fn aside(text: &str) {

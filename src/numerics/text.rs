@@ -23,7 +23,7 @@ pub const WIDTH: usize = 120;
 
 /// A line, broken between words where it is longer than [`WIDTH`]: prose goes on two characters further in, and the
 /// last column of a table below itself. A table whose last column begins beyond two thirds of the line stays whole.
-pub fn wrapped(line: &str) -> Cow<'_, str> {
+fn wrapped(line: &str) -> Cow<'_, str> {
     if line.chars().count() <= WIDTH {
         return Cow::Borrowed(line);
     }
@@ -47,6 +47,16 @@ pub fn wrapped(line: &str) -> Cow<'_, str> {
         text += word;
     }
     Cow::Owned(text)
+}
+
+/// What is printed of `text`: control characters escaped and long lines broken, but for names of files after
+/// `written: `, which scripts read.
+pub fn broken(text: &str) -> String {
+    let line = |line: &str| match escaped(line) {
+        line if line.starts_with("written: ") => line.into_owned(),
+        line => wrapped(&line).into_owned(),
+    };
+    text.split('\n').map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// Numbers by name to six digits, each after a comma.

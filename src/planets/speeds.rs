@@ -10,8 +10,8 @@ pub struct Speeds {
 }
 
 impl Speeds {
-    /// Velocities up to this are in m/s.
-    const SMALL_KMS: f64 = 1.5;
+    /// Velocities below this are in m/s.
+    const SMALL_KMS: f64 = 1.0;
 
     /// Those of a star.
     pub const KMS: Speeds = Speeds { factor: 1.0, name: "km/s" };
@@ -26,10 +26,16 @@ impl Speeds {
     pub fn cell(self, kms: Option<f64>) -> String {
         let digits = |kms: f64| match self == Speeds::KMS {
             true => 3,
-            false => usize::from(kms.abs() < 0.01),
+            false => usize::from(kms != 0.0 && kms.abs() < 0.01),
         };
         kms.map_or_else(|| "-".to_owned(), |kms| format!("{:.1$}", self.factor * kms, digits(kms)))
     }
+}
+
+/// A velocity (km/s) without an uncertainty, as in a table, with its unit.
+pub fn with_unit(kms: f64) -> String {
+    let unit = Speeds::of(&[kms]);
+    format!("{} {}", unit.cell(Some(kms)), unit.name)
 }
 
 #[cfg(test)]
@@ -41,6 +47,7 @@ mod tests {
         let unit = Speeds::of(&[0.0024, 0.3, f64::INFINITY, f64::NAN]);
         assert_eq!(unit.name, "m/s");
         assert_eq!([Some(0.0024), Some(0.3), None].map(|kms| unit.cell(kms)), ["2.4", "300", "-"]);
+        assert_eq!([0.0, 0.0024, 0.058, 1.3334].map(with_unit), ["0 m/s", "2.4 m/s", "58 m/s", "1.333 km/s"]);
         let unit = Speeds::of(&[1.6]);
         assert_eq!((unit, unit.cell(Some(0.0024))), (Speeds::KMS, "0.002".to_owned()));
     }

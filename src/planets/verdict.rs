@@ -4,6 +4,7 @@
 //! search. A detection must also have no caveats; otherwise it is a candidate, and the sentence names them. Convergence
 //! of a chain does not enter.
 
+use super::speeds::Speeds;
 use crate::numerics::normal;
 use serde::{Deserialize, Serialize};
 
@@ -97,10 +98,10 @@ impl Signal {
 
     /// Period and K with their uncertainties; K in m/s below 1 km/s.
     pub fn words(&self) -> String {
-        let (factor, unit) = unit(self.k_kms);
+        let Speeds { factor, name } = Speeds::of(&[self.k_kms]);
         let [k, sigma] = [self.k_kms, self.sigma_k_kms].map(|kms| factor * kms);
         let digits = decimals(sigma);
-        format!("P = {}, K = {k:.digits$} ± {sigma:.digits$} {unit}", self.period())
+        format!("P = {}, K = {k:.digits$} ± {sigma:.digits$} {name}", self.period())
     }
 }
 
@@ -339,16 +340,11 @@ pub fn false_alarm(p: f64, draws: usize) -> String {
     }
 }
 
-/// Factor of a velocity (km/s) for printing, and the unit.
-fn unit(kms: f64) -> (f64, &'static str) {
-    if kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") }
-}
-
 /// A velocity (km/s) with as many digits as its uncertainty allows, in m/s below 1 km/s.
 pub fn speed(kms: f64, sigma_kms: f64) -> String {
-    let (factor, unit) = unit(kms);
+    let Speeds { factor, name } = Speeds::of(&[kms]);
     let digits = decimals(factor * sigma_kms);
-    format!("{:.digits$} {unit}", factor * kms)
+    format!("{:.digits$} {name}", factor * kms)
 }
 
 /// The printed form of a probability.

@@ -10,7 +10,8 @@ use crate::data::scene::Scene;
 use crate::inference::detection::{KnownPlanets, PlanetFree};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
-use crate::planets::verdict::{CANDIDATE_FAP, false_alarm, speed};
+use crate::planets::speeds::with_unit;
+use crate::planets::verdict::{CANDIDATE_FAP, false_alarm};
 use crate::runs::blind_search::BlindSearchOptions;
 use crate::surface::expansion::{Nuisance, nuisances};
 use crate::surface::maps::{Deviation, ImageSummary};
@@ -195,7 +196,7 @@ impl FreeVelocities {
         let signal = peak.signal(scene.imager.star.rotation_period_d);
         let absorbed = match jitter_kms {
             0.0 => String::new(),
-            kms => format!("; the RV jitter of {} absorbs it", metres(kms)),
+            kms => format!("; the RV jitter of {} absorbs it", with_unit(kms)),
         };
         Some(format!(
             "{AS_ORBIT} ({}, {}){absorbed}: run `dimcmc periodogram {}`.",
@@ -233,29 +234,32 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     }
     lines.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
     lines.push(("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core)));
-    lines.push(("RV observed", format!("{} rms", metres(fit.observed_rv_rms_kms))));
+    lines.push(("RV observed", format!("{} rms", with_unit(fit.observed_rv_rms_kms))));
     if let Some(filtered) = fit.filtered_rv_rms_kms {
         let filtered = match (nuisances.is_empty(), zero_points_kms.is_empty()) {
-            (true, true) => format!("{} rms", metres(filtered)),
+            (true, true) => format!("{} rms", with_unit(filtered)),
             (true, false) => "n/a (degenerate with the fitted RV offsets)".to_owned(),
             (false, _) => "n/a (degenerate with the fitted continuum)".to_owned(),
         };
         lines.push(("RV filtered", filtered));
-        lines.push(("RV error", format!("{} (photon noise)", metres(fit.photon_rv_error_kms))));
+        lines.push(("RV error", format!("{} (photon noise)", with_unit(fit.photon_rv_error_kms))));
     }
     if let Some((rms, error)) = fit.rv_rms_kms.zip(fit.rv_error_kms) {
         let jitter_kms = field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);
         let counted = match jitter_kms {
             0.0 => String::new(),
-            kms => format!(", RV jitter of {} included", metres(kms)),
+            kms => format!(", RV jitter of {} included", with_unit(kms)),
         };
-        let text = format!("{} rms, uncertainty {} (correlated){counted}", metres(rms), metres(error));
+        let text = format!("{} rms, uncertainty {} (correlated){counted}", with_unit(rms), with_unit(error));
         lines.push(("RV corrected", text));
     }
     let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
     if !zero_points_kms.is_empty() {
         let squares = zero_points_kms.iter().map(|v| v * v).sum();
-        lines.push(("RV shifts", format!("{} rms (of single profiles)", metres(rms(squares, zero_points_kms.len())))));
+        lines.push((
+            "RV shifts",
+            format!("{} rms (of single profiles)", with_unit(rms(squares, zero_points_kms.len()))),
+        ));
     }
     if !nuisances.is_empty() {
         let [offset, slope, width] =
@@ -274,11 +278,6 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// A velocity to 1 m/s: in m/s, or from 1 km/s on in km/s.
-fn metres(kms: f64) -> String {
-    speed(kms, if kms != 0.0 && kms.abs() < 0.01 { 0.001 } else { 0.01 })
-}
-
 /// Those of a field.
 fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
     let caveat = |name: &str| field.caveat(name).map_or_else(String::new, |caveat| format!(", {caveat}"));
@@ -286,7 +285,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         ("amplitude", format!("{} (SD of the spot filling factor){}", field.amplitude(), caveat("spot_amplitude"))),
         ("power-law index", format!("{} ({}){}", field.slope(), field.spectrum(), caveat("spot_slope"))),
         ("lifetime", field.lifetime() + &caveat("spot_lifetime_d")),
-        ("RV jitter", metres(field.velocity_jitter_kms)),
+        ("RV jitter", with_unit(field.velocity_jitter_kms)),
         ("ln Z", format!("{:.2}", field.ln_evidence)),
     ]
 }

@@ -11,6 +11,7 @@ use crate::data::config::{
 use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings, most_offset_kms};
+use crate::planets::speeds::with_unit;
 use crate::star::observation::Observations;
 use crate::star::{BrightnessModel, Size};
 use crate::surface::calibration::first_look::{FirstLook, LineModel, LookError, Noise};
@@ -304,8 +305,8 @@ impl Values {
                     let remark = match draft.instrument.name {
                         Some(_) => "RV offsets of nights, up to twice the stability of the spectrograph".to_owned(),
                         None => format!(
-                            "RV offsets of nights, up to {:.0} m/s as no spectrograph is named; --instrument",
-                            1000.0 * most_offset_kms(None)
+                            "RV offsets of nights, up to {} as no spectrograph is named; --instrument",
+                            with_unit(most_offset_kms(None))
                         ),
                     };
                     ledger.note("observations.night_jitter_kms", "fitted", "km/s", Source::Assumed, remark);

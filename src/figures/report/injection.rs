@@ -3,7 +3,6 @@
 use super::chapter::Tone;
 use super::chapter::{Chapter, Table, number, pairs};
 use crate::data::io::truth::InjectedTruth;
-use crate::planets::speeds::Speeds;
 use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;
 
@@ -24,7 +23,7 @@ pub(super) fn injection(truth: &InjectedTruth) -> Chapter {
 
 /// For `limits.json`.
 pub(super) fn limits(file: &LimitsFile) -> Chapter {
-    let unit = Speeds::of(&file.k_kms);
+    let unit = file.unit();
     let row = |limit: &Limit| {
         let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
         vec![number(period_d, 4), number(porb_over_prot, 3), unit.cell(k50_kms), unit.cell(k95_kms)]

@@ -10,7 +10,7 @@ use crate::data::io::saved::Saved;
 use crate::numerics::quantile::middle;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::Search;
-use crate::planets::speeds::Speeds;
+use crate::planets::speeds::{Speeds, with_unit};
 use crate::planets::verdict::{CANDIDATE_FAP, decimals, false_alarm, probability, speed, usual_draws};
 use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
@@ -174,6 +174,11 @@ impl LimitsFile {
         })
     }
 
+    /// The unit of K in a table of the limits.
+    pub fn unit(&self) -> Speeds {
+        Speeds::of(&self.limits.iter().flat_map(|limit| [limit.k50_kms, limit.k95_kms]).flatten().collect::<Vec<_>>())
+    }
+
     /// The rotation period, the unit of periods (d).
     pub fn rotation_period_d(&self) -> f64 {
         self.limits.first().map_or(f64::NAN, |limit| limit.period_d / limit.porb_over_prot)
@@ -181,15 +186,13 @@ impl LimitsFile {
 
     /// Median limits over the periods.
     pub fn sentence(&self) -> String {
-        let unit = Speeds::of(&self.k_kms);
-        let speed = |kms: f64| format!("{} {}", unit.cell(Some(kms)), unit.name);
         let (least, most) = (self.k_kms.first().copied(), self.k_kms.last().copied());
         let typical = |of: fn(&Limit) -> Option<f64>| {
             let k = middle(self.limits.iter().map(|limit| of(limit).unwrap_or(f64::INFINITY)).collect());
             match k.is_finite() {
-                true if least.is_some_and(|least| k <= least) => format!("K < {}", speed(k)),
-                true => format!("K = {}", speed(k)),
-                false => format!("K > {}", speed(most.unwrap_or(f64::NAN))),
+                true if least.is_some_and(|least| k <= least) => format!("K < {}", with_unit(k)),
+                true => format!("K = {}", with_unit(k)),
+                false => format!("K > {}", with_unit(most.unwrap_or(f64::NAN))),
             }
         };
         format!(
@@ -202,7 +205,7 @@ impl LimitsFile {
 
     /// A table of some of the periods, and possible problems.
     pub fn table(&self) -> String {
-        let unit = Speeds::of(&self.k_kms);
+        let unit = self.unit();
         let [k50, k95] = [50, 95].map(|share| format!("K {share} % ({})", unit.name));
         let mut rows = vec![["period_d", "porb_over_prot", &k50, &k95].map(str::to_owned).to_vec()];
         let step = self.limits.len().div_ceil(SHOWN).max(1);

@@ -6,7 +6,7 @@ use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::data::io::saved::Saved;
 use crate::numerics::text::{aligned, escaped};
-use crate::planets::speeds::Speeds;
+use crate::planets::speeds::{Speeds, with_unit};
 use crate::planets::verdict::{CANDIDATE_FAP, speed};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -303,7 +303,7 @@ impl ScheduleRecord {
             "spots {lives}, amplitude {spot_amplitude:.2}, power-law index {spot_slope:.2} ({}); RV jitter \
             {}; S/N {:.0}\n",
             source.words(),
-            speed(velocity_jitter_kms, 0.01),
+            with_unit(velocity_jitter_kms),
             self.snr
         );
         for SetRecord { name, taken, planned, nights, snr } in &self.sets {

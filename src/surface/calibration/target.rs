@@ -9,6 +9,7 @@
 
 use crate::maxent::{Goal, Problem, Solution, Solver, SolverSettings, Start};
 use crate::model::ParameterValues;
+use crate::planets::speeds::with_unit;
 use crate::star::observation::Profile;
 use crate::surface::imaging::Imager;
 use crate::surface::static_map::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
@@ -50,9 +51,9 @@ impl ChosenTarget {
             (false, false) => "",
         };
         format!(
-            "{value} per datum; filtered residual RV rms {:.0} m/s, {left:.0} % less with twice the weight of the \
+            "{value} per datum; filtered residual RV rms {}, {left:.0} % less with twice the weight of the \
              data{still}",
-            1000.0 * filtered_rv_rms_kms
+            with_unit(*filtered_rv_rms_kms)
         )
     }
 }

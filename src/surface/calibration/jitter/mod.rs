@@ -15,6 +15,7 @@ mod fit;
 pub use fit::{BesideOrbit, Scatter};
 
 use crate::model::{Parameter, ParameterValues};
+use crate::planets::speeds::with_unit;
 use crate::surface::ReferenceError;
 use crate::surface::expansion::{Expansion, velocity_slopes};
 use crate::surface::imaging::Imager;
@@ -85,10 +86,10 @@ impl MeasuredJitter {
         let alone = scatter(&self.without_planet);
         let Some(orbit) = &self.beside_orbit else { return format!("{alone} (no planet)") };
         let beside = format!(
-            "{} with the best orbit (P = {:.4} P_rot, K = {:.0} m/s, ln B = {:.1})",
+            "{} with the best orbit (P = {:.4} P_rot, K = {}, ln B = {:.1})",
             scatter(&orbit.scatter),
             orbit.porb_over_prot,
-            1000.0 * orbit.k_kms,
+            with_unit(orbit.k_kms),
             orbit.ln_odds
         );
 
