@@ -169,7 +169,7 @@ def init(
     else:
         Path(out).write_text(text, encoding="utf-8", newline="\n")
         config = Config(out)
-    config._say(table.rstrip())
+    config._say(_core.broken(table.rstrip()))
     return config
 
 
