@@ -277,7 +277,7 @@ impl Values {
             (Some(measured), _) => format!("measured by every command: {}", measured.line()),
             (None, Some(scatter)) => {
                 format!(
-                    "rough, measured by every command: quoted uncertainty {:.1e}, continuum rms {scatter:.1e}",
+                    "estimate; measured by every command: quoted uncertainty {:.1e}, continuum rms {scatter:.1e}",
                     noise.quoted
                 )
             }
