@@ -26,8 +26,8 @@ use std::path::{Path, PathBuf};
 /// after the first is fitted.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
-    demo.json"
+    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 \\\n    \
+                  --out demo.json"
 )]
 pub struct Args {
     /// List of profiles, one per line: file, time (d), and optionally the velocity to subtract (km/s). Several lists

@@ -21,8 +21,8 @@ use std::path::PathBuf;
 /// profiles adds to the injected one.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 --out \
-    demo_injected"
+    after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 \\\n    \
+                  --out demo_injected"
 )]
 pub struct Args {
     /// Config file (JSON)

@@ -17,8 +17,8 @@ use std::path::PathBuf;
 /// the probability that each signal is a false alarm. Writes survey.csv, completeness.csv and survey.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc survey runs/demo_periodogram runs/demo_limits --out runs/demo_survey\n  \
-                        dimcmc survey runs/demo_periodogram runs/demo_limits --box 0.5:5,0.05:1 --box 5:20,0.05:1 \
-                        --out runs/demo_survey_2")]
+                        dimcmc survey runs/demo_periodogram runs/demo_limits --box 0.5:5,0.05:1 \\\n    \
+                        --box 5:20,0.05:1 --out runs/demo_survey_2")]
 pub struct Args {
     /// Folders with searches and limits, at any depth up to 4
     #[arg(required = true, value_name = "FOLDER")]

@@ -34,11 +34,13 @@ const ORDER: &[&str] = &[
     "export",
 ];
 
-/// The lines below "Example:" in the help of a command.
+/// The examples below "Example:" in the help of a command, each in one line; none is wider than a narrow terminal.
 fn examples(command: &str) -> Vec<String> {
     let whole = help(&[command, "--help"]);
     let (_, examples) =
         whole.rsplit_once("Example:").unwrap_or_else(|| panic!("dimcmc {command} --help has no Example:"));
+    assert!(examples.lines().all(|line| line.chars().count() <= 80), "{command}: a terminal breaks an example");
+    let examples = examples.replace("\\\n   ", "");
     let lines = examples.lines().map(str::trim).filter(|line| !line.is_empty());
     let lines: Vec<String> = lines.map(str::to_owned).collect();
     let begin = format!("dimcmc {command} ");
@@ -71,10 +73,13 @@ fn every_example_works() {
 
 /// A command that is in none of the groups of `dimcmc --help` stands under "Others".
 #[test]
-fn every_command_has_its_group() {
+fn every_command_has_its_group_and_its_examples() {
     let whole = help(&["--help"]);
     assert!(!whole.contains("Others:"), "a command has no place in src/cli/groups.rs:\n{whole}");
     assert!(commands().len() >= 13, "{whole}");
+    for command in commands() {
+        assert!(!examples(&command).is_empty());
+    }
     for args in [&["-h"][..], &["help"]] {
         assert_eq!(help(args), whole);
     }
