@@ -25,10 +25,8 @@ use std::path::{Path, PathBuf};
 /// Several lists are data sets of one star, one per spectrograph. They share one config, and the RV offset of each set
 /// after the first is fitted.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 \\\n    \
-                  --out demo.json"
-)]
+#[command(after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 \\\n    \
+                  --inclination 38 --out demo.json")]
 pub struct Args {
     /// List of profiles, one per line: file, time (d), and optionally the velocity to subtract (km/s). Several lists
     /// are data sets of one star
