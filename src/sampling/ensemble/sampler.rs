@@ -10,6 +10,7 @@ use crate::sampling::ensemble::{EnsembleError, Mix, Move, Proposal, SamplerSetti
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status};
 use rand::Rng;
 use rand::seq::SliceRandom;
+use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// One walker.
@@ -184,43 +185,33 @@ impl<'a> Sampler<'a> {
 
     /// The proposals for one half of every ensemble.
     fn propose(&self, state: &State, splits: &[Vec<usize>], half: usize) -> Vec<Trial> {
-        let mut trials = Vec::with_capacity(self.ensembles * self.walkers / 2);
-        for (ensemble, (walkers, split)) in state.ensembles.iter().zip(splits).enumerate() {
-            let internal = |&walker: &usize| self.density.to_sampling(&walkers[walker].theta);
-            let (first, second) = split.split_at(self.walkers / 2);
+        let Sampler { density, mix, seed, walkers: count, .. } = self;
+        let each = state.ensembles.iter().zip(splits).enumerate().map(|(ensemble, (walkers, split))| {
+            let internal = |&walker: &usize| density.to_sampling(&walkers[walker].theta);
+            let (first, second) = split.split_at(count / 2);
             let (moved, others) = if half == 0 { (first, second) } else { (second, first) };
             let complement: Vec<Vec<f64>> = others.iter().map(internal).collect();
-            for &walker in moved {
-                let mut rng = random_numbers(self.seed, stream(Purpose::Walker, ensemble, walker), state.step);
-                let here = internal(&walker);
-                let proposal = self.mix.propose(&here, &complement, &mut rng);
-                let theta = self.density.to_physical(&proposal.position);
-                let refused = match proposal.position == here {
-                    // no new evaluation needed
-                    true => Some(Status::OutsidePrior),
-                    false => self.refuse(&proposal.position, &theta, proposal.translation),
-                };
-                let log_uniform = rng.random::<f64>().ln();
-                let Proposal { log_factor, by, .. } = proposal;
-                trials.push(Trial { ensemble, walker, theta, log_factor, log_uniform, by, refused });
-            }
-        }
-        trials
-    }
-
-    /// Why a proposal need not be evaluated: it is not finite, or lies beyond the wrap of a periodic coordinate.
-    fn refuse(&self, position: &[f64], theta: &[f64], translation: bool) -> Option<Status> {
-        if position.iter().chain(theta).any(|x| !x.is_finite()) {
-            return Some(Status::NonFinite);
-        }
-        if translation {
-            return None;
-        }
-        // Rounding is some 1e-16 of the largest coordinate; a wrap is by a period.
-        let largest = position.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-        let back = self.density.to_sampling(theta);
-        let wrapped = position.iter().zip(&back).any(|(x, y)| (x - y).abs() > 1e-6 * largest);
-        wrapped.then_some(Status::OutsidePrior)
+            // a proposal of the surrogate takes a tenth of an evaluation
+            let of_ensemble: Vec<Trial> = moved
+                .par_iter()
+                .map(|&walker| {
+                    let mut rng = random_numbers(*seed, stream(Purpose::Walker, ensemble, walker), state.step);
+                    let here = internal(&walker);
+                    let proposal = mix.propose(&here, &complement, &mut rng);
+                    let theta = density.to_physical(&proposal.position);
+                    let refused = match proposal.position == here {
+                        // no new evaluation needed
+                        true => Some(Status::OutsidePrior),
+                        false => refuse(*density, &proposal.position, &theta, proposal.translation),
+                    };
+                    let log_uniform = rng.random::<f64>().ln();
+                    let Proposal { log_factor, by, .. } = proposal;
+                    Trial { ensemble, walker, theta, log_factor, log_uniform, by, refused }
+                })
+                .collect();
+            of_ensemble
+        });
+        each.flatten().collect()
     }
 
     /// Accepts or rejects a trial.
@@ -275,6 +266,21 @@ impl<'a> Sampler<'a> {
         second.sort_unstable();
         order
     }
+}
+
+/// Why a proposal need not be evaluated: it is not finite, or lies beyond the wrap of a periodic coordinate.
+fn refuse(density: &dyn LogDensity, position: &[f64], theta: &[f64], translation: bool) -> Option<Status> {
+    if position.iter().chain(theta).any(|x| !x.is_finite()) {
+        return Some(Status::NonFinite);
+    }
+    if translation {
+        return None;
+    }
+    // Rounding is some 1e-16 of the largest coordinate; a wrap is by a period.
+    let largest = position.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    let back = density.to_sampling(theta);
+    let wrapped = position.iter().zip(&back).any(|(x, y)| (x - y).abs() > 1e-6 * largest);
+    wrapped.then_some(Status::OutsidePrior)
 }
 
 /// The records of a state, given the result for each walker (`ensemble * walkers + walker`).

@@ -10,7 +10,6 @@ use super::student;
 use crate::model::{Elements, Parameter, ParameterSpace, Prior};
 use crate::surface::expansion::Expansion;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rand::RngCore;
 
 /// The nonlinear coordinates that determine a quadratic in the linear ones.
 #[derive(Clone, Debug)]
@@ -216,9 +215,17 @@ impl LinearModel {
     /// The quadratic for given nonlinear coordinates, with draws as if ln L were divided by `temperature`; `None` where
     /// it has no maximum.
     pub fn at(&self, given: &Given, temperature: f64) -> Option<Conditional> {
+        self.at_each(&[given], temperature).pop().flatten()
+    }
+
+    /// The same for several.
+    pub fn at_each(&self, given: &[&Given], temperature: f64) -> Vec<Option<Conditional>> {
         match &self.source {
-            Source::One(pieces) => self.of_pieces(pieces, given, temperature),
-            Source::Several(between, _) => self.of_pieces(&between.at(&given.field), given, temperature),
+            Source::One(pieces) => given.iter().map(|given| self.of_pieces(pieces, given, temperature)).collect(),
+            Source::Several(between, _) => {
+                let pieces = between.at(given.iter().map(|given| &given.field));
+                given.iter().zip(&pieces).map(|(given, pieces)| self.of_pieces(pieces, given, temperature)).collect()
+            }
         }
     }
 
@@ -281,14 +288,14 @@ impl Conditional {
         self.log_determinant
     }
 
-    /// Linear coordinates drawn from a t distribution around the mode, and ln of the density there.
-    pub fn draw(&self, rng: &mut dyn RngCore) -> (DVector<f64>, f64) {
-        let at = student::draw(self.mode.len(), rng);
-        let step = self.factor.l_dirty().tr_solve_lower_triangular(&at).expect("a factor has no zero on its diagonal");
-        (&self.mode + step, 0.5 * self.log_determinant + student::log_density(&at))
+    /// Linear coordinates at a draw `at` of the t distribution ([`student::draw`]), put around the mode, and ln of the
+    /// density there.
+    pub fn drawn(&self, at: &DVector<f64>) -> (DVector<f64>, f64) {
+        let step = self.factor.l_dirty().tr_solve_lower_triangular(at).expect("a factor has no zero on its diagonal");
+        (&self.mode + step, 0.5 * self.log_determinant + student::log_density(at))
     }
 
-    /// ln of the density with which [`Conditional::draw`] gives `y`.
+    /// ln of the density with which [`Conditional::drawn`] gives `y`.
     pub fn log_density(&self, y: &DVector<f64>) -> f64 {
         let at = self.factor.l_dirty().lower_triangle().tr_mul(&(y - &self.mode));
         0.5 * self.log_determinant + student::log_density(&at)

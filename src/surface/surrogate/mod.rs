@@ -71,6 +71,16 @@ struct Place {
     log_proposal: f64,
 }
 
+/// A proposal of the walk before its quadratic is known.
+#[derive(Clone, Debug)]
+struct Attempt {
+    given: Given,
+    /// The linear coordinates, in units of their uncertainties around their mode.
+    linear: DVector<f64>,
+    /// ln of the density of `given`.
+    log_proposal: f64,
+}
+
 impl Surrogate {
     /// Around `reference`; `None` where the space is not supported, or the likelihood has no maximum to second order.
     pub fn new(imager: &Imager, space: &ParameterSpace, reference: &Reference) -> Option<Self> {
@@ -152,6 +162,12 @@ impl Surrogate {
 
     /// A point drawn from the tables of periods, the priors of shapes, and the Gaussian (with heavier tails) there.
     fn propose(&self, rng: &mut dyn RngCore) -> Option<Place> {
+        let attempt = self.attempt(rng);
+        self.model.at(&attempt.given, self.temperature).map(|conditional| self.placed(&attempt, &conditional))
+    }
+
+    /// The random numbers of a proposal.
+    fn attempt(&self, rng: &mut dyn RngCore) -> Attempt {
         let mut log_proposal = 0.0;
         let mut planets = Vec::with_capacity(self.periods.len());
         for (planet, table) in self.model.planets().iter().zip(&self.periods) {
@@ -163,12 +179,16 @@ impl Surrogate {
         let between = self.model.interpolation().map(|(between, _)| between);
         let (field, log_field) = between.map_or((DVector::zeros(0), 0.0), |b| b.draw(self.temperature, rng));
         log_proposal += log_field;
-        let given = Given { planets, field };
-        let conditional = self.model.at(&given, self.temperature)?;
-        let (linear, log_linear) = conditional.draw(rng);
-        let position = self.model.position(&given, &linear);
-        let log_density = self.density(&conditional, &linear, &position);
-        Some(Place { position, log_density, log_proposal: log_proposal + log_linear })
+        let linear = student::draw(self.model.linear_count(), rng);
+        Attempt { given: Given { planets, field }, linear, log_proposal }
+    }
+
+    /// The point of an attempt, by the quadratic at its nonlinear coordinates.
+    fn placed(&self, attempt: &Attempt, conditional: &Conditional) -> Place {
+        let (linear, log_linear) = conditional.drawn(&attempt.linear);
+        let position = self.model.position(&attempt.given, &linear);
+        let log_density = self.density(conditional, &linear, &position);
+        Place { position, log_density, log_proposal: attempt.log_proposal + log_linear }
     }
 
     /// The point at `position`.
@@ -189,11 +209,15 @@ impl Surrogate {
     /// The end of a walk of independent proposals on the surrogate that begins at `place`: reversible with respect to
     /// it, and after so many steps nearly an independent draw.
     fn walk(&self, mut place: Place, rng: &mut dyn RngCore) -> Place {
-        for _ in 0..self.walk {
-            let log_uniform = rng.random::<f64>().ln();
-            let Some(next) = self.propose(rng) else { continue };
+        // none depends on the one before: their quadratics are found together
+        let attempts: Vec<(f64, Attempt)> =
+            (0..self.walk).map(|_| (rng.random::<f64>().ln(), self.attempt(rng))).collect();
+        let given: Vec<&Given> = attempts.iter().map(|(_, attempt)| &attempt.given).collect();
+        let conditionals = self.model.at_each(&given, self.temperature);
+        for ((log_uniform, attempt), conditional) in attempts.iter().zip(conditionals) {
+            let Some(next) = conditional.map(|conditional| self.placed(attempt, &conditional)) else { continue };
             let gain = |p: &Place| p.log_density - p.log_proposal;
-            if next.log_density.is_finite() && log_uniform < gain(&next) - gain(&place) {
+            if next.log_density.is_finite() && *log_uniform < gain(&next) - gain(&place) {
                 place = next;
             }
         }
