@@ -305,7 +305,8 @@ impl Values {
                     let remark = match draft.instrument.name {
                         Some(_) => "RV offsets of nights, up to twice the stability of the spectrograph".to_owned(),
                         None => format!(
-                            "RV offsets of nights, up to {} as no spectrograph is named; --instrument",
+                            "RV offsets of nights, up to {} as no spectrograph is named: they hide small planets; \
+                            --instrument",
                             with_unit(most_offset_kms(None))
                         ),
                     };
