@@ -96,10 +96,10 @@ fn told(star: &str, seed: u64) -> (String, Vec<String>) {
         check(k_off.abs() < 0.3 && p_off.abs() < 0.3, format!("K {k_off:.2}, P {p_off:.2} sigma apart"));
     }
     let row = format!(
-        "| {star} {seed} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {ln_b:.1} | {:.3} +- {:.3} | {:.3} | {:.2} +- {:.2} | \
+        "| {star} {seed} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {ln_b:.1} | {:.3} ± {:.3} | {:.3} | {:.2} ± {:.2} | \
         {:.2} | {} | {:.0} |",
-        findings[0],
-        findings[1],
+        findings[0].replace("no-planet-needed", "none"),
+        findings[1].replace("no-planet-needed", "none"),
         faps[0],
         faps[1],
         faps[2],
@@ -159,7 +159,7 @@ fn by_hand_offsets_between_spectrographs() {
         let [value, sigma] = ["value_kms", "sigma_kms"].map(|key| number(&offset[key]));
         let pull = (value - OFFSET_KMS) / sigma;
         println!(
-            "| {seed} | {} | {:.1e} | {value:.3} +- {sigma:.3} | {pull:+.2} | {:.3} +- {:.3} | {:.2} +- {:.2} | \
+            "| {seed} | {} | {:.1e} | {value:.3} ± {sigma:.3} | {pull:+.2} | {:.3} ± {:.3} | {:.2} ± {:.2} | \
             {:.0} |",
             verdict["finding"].as_str().unwrap(),
             number(&verdict["false_alarm_probability"]),

@@ -70,8 +70,8 @@ impl Interpolation {
         self.centre.clone()
     }
 
-    /// The pieces at some points. One product for all reads the known pieces, megabytes, once: for the points of a walk
-    /// that is five times as fast as one by one.
+    /// The pieces at some points. One product for all reads the known pieces, megabytes, once: a walk takes a third of
+    /// the time that it takes with one by one.
     pub fn at<'a>(&self, places: impl Iterator<Item = &'a DVector<f64>>) -> Vec<Pieces> {
         let basis = |place| self.basis(&self.in_units(place).expect("a factor has no zero on its diagonal"));
         let bases: Vec<DVector<f64>> = places.map(basis).collect();
