@@ -205,6 +205,8 @@ fn where_there_is_no_star_it_says_so() {
     assert!(matches!(look(&made(|v| 1e-3 * (v * v).sin())), LookError::NoLine { .. }));
     assert!(matches!(look(&made(|v| -0.3 * (-v * v / 100.0).exp())), LookError::NoLine { .. }), "emission");
     assert!(matches!(look(&made(|v| 0.3 * (-(v - 50.0).powi(2) / 400.0).exp())), LookError::LineCut { .. }));
+    let wide = |v: f64| 0.3 * (1.0 - (v / 70.0).powi(2)).sqrt();
+    assert!(matches!(look(&made(wide)), LookError::EndsInLine { .. }), "{}", look(&made(wide)));
     assert!(matches!(look(&made(|v| if v == 3.0 { 0.5 } else { 0.0 })), LookError::LineTooNarrow { bins: 1 }));
     let mut apart = made(|v| 0.3 * (-v * v / 100.0).exp());
     apart.profiles[1].first_velocity_kms = 48.0;

@@ -16,6 +16,9 @@ const LEAST_SIGNIFICANCE: f64 = 5.0;
 /// The inverse of the fraction of a profile that counts as one of its ends.
 const ENDS: usize = 20;
 
+/// Profiles with more of the largest depth left at their ends may not have the whole line.
+const CUT: f64 = 0.1;
+
 /// The mean of all profiles, on the bins that all of them have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeanProfile {
@@ -112,6 +115,11 @@ impl MeanProfile {
     /// Level of the continuum, or of the outermost part of the line.
     pub fn level(&self) -> f64 {
         1.0 - self.at_its_ends()
+    }
+
+    /// Whether a tenth of the depth is left at the ends: of the line, or of a continuum that is not at 1.
+    pub fn may_end_in_line(&self) -> bool {
+        self.at_its_ends() > CUT * self.depth.iter().copied().fold(0.0, f64::max)
     }
 
     /// Uncertainty (km/s) of the middle of two crossings by the noise of the mean profile alone.

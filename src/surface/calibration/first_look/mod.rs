@@ -141,6 +141,20 @@ pub enum LookError {
     /// The fit diverged.
     #[error("the mean profile is not like that of a rotating star: the fit for vsini does not converge")]
     NoRotation,
+    /// The same where the data may end within the line.
+    #[error(
+        "the mean profile is not like that of a rotating star (the fit for vsini does not converge): does the line \
+        reach beyond the data? They end at {level:.3} of the continuum, at {from_kms:.1} and {to_kms:.1} km/s; use a \
+        wider --velocity-range, or give profiles that reach farther"
+    )]
+    EndsInLine {
+        /// Intensity at the ends.
+        level: f64,
+        /// First velocity that all profiles have (km/s).
+        from_kms: f64,
+        /// Last one.
+        to_kms: f64,
+    },
 }
 
 impl FirstLook {
@@ -162,7 +176,13 @@ impl FirstLook {
         line.check(&mean)?;
         let half_depth = mean.half_depth()?;
         let fit = |line| Unspotted::fit(&mean, half_depth, line);
-        let unspotted = fit(line)?;
+        let unspotted = fit(line).map_err(|error| match error {
+            LookError::NoRotation if mean.may_end_in_line() => {
+                let (from_kms, to_kms) = mean.range_kms();
+                LookError::EndsInLine { level, from_kms, to_kms }
+            }
+            error => error,
+        })?;
         let reach_kms = unspotted.reach_kms(line.instrumental_sigma_kms);
         let continuum = Continuum::of(observations, unspotted.centre_kms, reach_kms);
         if elsewhere
