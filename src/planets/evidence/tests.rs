@@ -35,6 +35,30 @@ fn a_uniform_prior_of_k_has_a_closed_form() {
     });
 }
 
+/// Sums over few directions agree with those over many, each ray by itself, wherever the orbit is and however much
+/// better one direction is known than the other.
+#[test]
+fn a_few_directions_are_enough() {
+    with_priors([[1.0, 2.0]; 2], 0.0, |[prior, _]| {
+        for (sigma, ratio) in [(0.02, 1.0), (0.02, 3.0), (0.004, 1.5), (0.1, 8.0), (1.0, 30.0)] {
+            for (k, phase) in [(0.0, 0.0), (0.05, 0.3), (0.2, 2.0), (0.39, 4.0)] {
+                let a = Matrix2::new(1.0, 0.3, 0.3, 1.0 / (ratio * ratio)) / (sigma * sigma);
+                let a = if a.determinant() > 0.0 { a } else { Matrix2::from_diagonal(&a.diagonal()) };
+                let b = a * Vector2::new(k * f64::cos(phase), k * f64::sin(phase));
+                const MANY: usize = 20_000;
+                let rays = (0..MANY).map(|i| {
+                    let (sin, cos) = (TAU * i as f64 / MANY as f64).sin_cos();
+                    let direction = Vector2::new(cos, sin);
+                    ln_along_ray(direction.dot(&(a * direction)), b.dot(&direction), &prior.k)
+                });
+                let wanted = ln_sum(&rays.collect::<Vec<_>>()) - (MANY as f64).ln();
+                let found = ln_over_k_and_phase(&a, &b, &prior.k);
+                assert!((found - wanted).abs() < 1e-5, "{sigma} {ratio} {k} {phase}: {found} {wanted}");
+            }
+        }
+    });
+}
+
 /// Middles of cells.
 fn cells(n: usize, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> + Clone {
     (0..n).map(move |i| low + (high - low) * (i as f64 + 0.5) / n as f64)
