@@ -230,7 +230,9 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     if !light.is_empty() {
         let squares: f64 = light.iter().map(|fit| ((fit.bin.flux - fit.model) / fit.bin.sigma).powi(2)).sum();
         let bins = light.len();
-        lines.push(("flux", format!("chi2 {squares:.2} for {bins} bins (χ²/N = {:.4})", squares / bins as f64)));
+        let per_bin = squares / bins as f64;
+        let plural = if bins == 1 { "" } else { "s" };
+        lines.push(("flux", format!("chi2 {squares:.2} for {bins} bin{plural} (χ²/N = {per_bin:.4})")));
     }
     lines.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
     lines.push(("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core)));

@@ -185,13 +185,13 @@ impl Binned {
     pub fn line(&self) -> String {
         let LightCurve { name, bins, segments, .. } = &self.curve;
         let sigma = bins.iter().map(|bin| bin.sigma).sum::<f64>() / bins.len() as f64;
-        let parted = if *segments == 1 { "segment" } else { "segments" };
+        let counted = |count: usize, one: &str| format!("{count} {one}{}", if count == 1 { "" } else { "s" });
+        let (bins, segments) = (counted(bins.len(), "bin"), counted(*segments, "segment"));
         let left_out = match self.left_out {
             0 => String::new(),
             some => format!(", {some} measurements left out"),
         };
-        let bins = bins.len();
-        format!("{name}: {bins} bins in {segments} {parted}, error {sigma:.1e} of the flux in the mean{left_out}")
+        format!("{name}: {bins} in {segments}, error {sigma:.1e} of the flux in the mean{left_out}")
     }
 }
 
