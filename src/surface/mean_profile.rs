@@ -136,6 +136,9 @@ mod tests {
         Seen { line, ..sampling.into() }
     }
 
+    /// The sum of the squares of adjacent Gaussians is 1 but for this.
+    const RIPPLE: f64 = 0.02;
+
     /// Covariance of two profiles in the middle of the range.
     fn covariance(all: &[DMatrix<f64>], one: usize, other: usize) -> f64 {
         all[one].row(30).dot(&all[other].row(30))
@@ -146,7 +149,7 @@ mod tests {
         let all = of_sets(&star(), &[set(None)]);
         assert_eq!((all.len(), all[0].shape()), (2, (61, 16)));
         assert_eq!(all[0], all[1]);
-        assert!((covariance(&all, 0, 0) - 1.0).abs() < 0.01);
+        assert!((covariance(&all, 0, 0) - 1.0).abs() < RIPPLE);
     }
 
     #[test]
@@ -156,7 +159,7 @@ mod tests {
         let all = of_sets(&star(), &[set(None), set(Some(other_spectrograph))]);
         assert_eq!(all[0].ncols(), 3 * 16);
         let within = covariance(&all, 2, 3);
-        assert!((within - 1.0).abs() < 0.01, "{within}");
+        assert!((within - 1.0).abs() < RIPPLE, "{within}");
         assert!((covariance(&all, 0, 2) - (1.0 - OWN * OWN) * within).abs() < 1e-12);
 
         let wider = LocalLine { instrumental_sigma_kms: 2.0, ..LocalLine::gaussian(4.0f64.hypot(2.0), 6.0) };
