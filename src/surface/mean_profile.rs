@@ -33,7 +33,7 @@ pub fn columns(imager: &Imager) -> Vec<DMatrix<f64>> {
 
 fn of_sets(star: &StarSettings, sets: &[Seen]) -> Vec<DMatrix<f64>> {
     let mut numbers = 0;
-    // of each data set: its Gaussians, and the first columns and sizes of what it shares and of its own
+    // of each data set: its Gaussians, and the first columns and sizes of the shared and of the separate error
     let mut places: Vec<Option<(Basis, Vec<(usize, f64)>)>> = vec![None; sets.len()];
     for group in groups(star, sets) {
         let basis = Basis::of(group.iter().map(|&i| &sets[i]));
