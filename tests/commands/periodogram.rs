@@ -201,4 +201,18 @@ fn all_maps_of_a_star_that_changes_are_integrated_over() {
     assert!((number(&best["porb_over_prot"]) - 1.7).abs() < 0.2, "{best}");
     assert!((5.0..200.0).contains(&number(&field["spot_lifetime_d"])), "{field}");
     assert!(found["change"].is_null() && found["robustness"]["targets"].as_array().unwrap().is_empty());
+
+    // priors that exclude this orbit, and allow any K
+    let mut elsewhere = desk.config.clone();
+    elsewhere["planet"] = json!({ "k_kms": 0.1, "porb_over_prot": 0.5, "phi": 0.2 });
+    elsewhere["parameters"]["k_kms"] = json!({ "prior": "uniform", "min": 0, "max": 150 });
+    elsewhere["parameters"]["porb_over_prot"] = json!({ "prior": "uniform", "min": 0.3, "max": 0.9 });
+    desk.write("elsewhere.json", &elsewhere.to_string());
+    let table = desk.succeed(&["periodogram", "elsewhere.json", "--out", "b"]);
+    says(&table, &["lies outside the period prior and may alias into it", "The prior of K is far wider than σ_K"]);
+    let other = desk.json("b/periodogram.json");
+    assert_eq!(other["best"], *best, "the search is the same");
+    assert_eq!(other["verdict"]["finding"], "no-planet-needed");
+    let of_verdict = number(&other["verdict"]["signal"]["period_d"]);
+    assert!(of_verdict < 0.6 * number(&best["period_d"]), "the highest peak within the priors: {of_verdict}");
 }
