@@ -33,8 +33,7 @@ pub fn columns(imager: &Imager) -> Vec<DMatrix<f64>> {
 
 fn of_sets(star: &StarSettings, sets: &[Seen]) -> Vec<DMatrix<f64>> {
     let mut numbers = 0;
-    // of each data set: its Gaussians, and the first columns and sizes of the shared and of the separate error
-    let mut places: Vec<Option<(Basis, Vec<(usize, f64)>)>> = vec![None; sets.len()];
+    let mut places: Vec<Option<Place>> = vec![None; sets.len()];
     for group in groups(star, sets) {
         let basis = Basis::of(group.iter().map(|&i| &sets[i]));
         let shared = (group.len() > 1).then_some(numbers);
@@ -44,11 +43,11 @@ fn of_sets(star: &StarSettings, sets: &[Seen]) -> Vec<DMatrix<f64>> {
                 Some(shared) => vec![(shared, (1.0 - OWN * OWN).sqrt()), (numbers, OWN)],
                 None => vec![(numbers, 1.0)],
             };
-            places[i] = Some((basis, blocks));
+            places[i] = Some(Place { basis, blocks });
             numbers += basis.count;
         }
     }
-    let of_set = |(set, (basis, blocks)): (&Seen, (Basis, Vec<(usize, f64)>))| {
+    let of_set = |(set, Place { basis, blocks }): (&Seen, Place)| {
         let of_profile = |&(_, velocity, bins): &(f64, f64, usize)| {
             let mut columns = DMatrix::zeros(bins, numbers);
             for j in 0..bins {
@@ -62,6 +61,14 @@ fn of_sets(star: &StarSettings, sets: &[Seen]) -> Vec<DMatrix<f64>> {
         set.sampling.profiles.iter().map(of_profile).collect::<Vec<_>>()
     };
     sets.iter().zip(places.into_iter().flatten()).flat_map(of_set).collect()
+}
+
+/// The columns of a data set.
+#[derive(Clone)]
+struct Place {
+    basis: Basis,
+    /// The first columns and sizes of the shared and of the separate error.
+    blocks: Vec<(usize, f64)>,
 }
 
 /// Adjacent Gaussians.
