@@ -59,6 +59,11 @@ pub fn broken(text: &str) -> String {
     text.split('\n').map(line).collect::<Vec<_>>().join("\n")
 }
 
+/// The plural of an English noun, after it: "s" unless there is one.
+pub fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
 /// Numbers by name to six digits, each after a comma.
 pub fn listed<'a>(numbers: impl IntoIterator<Item = (&'a String, &'a f64)>) -> String {
     let one = |(name, value): (&String, &f64)| {

@@ -9,6 +9,7 @@ use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
 use crate::inference::detection::{KnownPlanets, PlanetFree};
 use crate::model::Parameter;
+use crate::numerics::text::plural;
 use crate::planets::periodogram::Peak;
 use crate::planets::speeds::with_unit;
 use crate::planets::verdict::{CANDIDATE_FAP, false_alarm};
@@ -231,8 +232,7 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
         let squares: f64 = light.iter().map(|fit| ((fit.bin.flux - fit.model) / fit.bin.sigma).powi(2)).sum();
         let bins = light.len();
         let per_bin = squares / bins as f64;
-        let plural = if bins == 1 { "" } else { "s" };
-        lines.push(("flux", format!("chi2 {squares:.2} for {bins} bin{plural} (χ²/N = {per_bin:.4})")));
+        lines.push(("flux", format!("chi2 {squares:.2} for {bins} bin{} (χ²/N = {per_bin:.4})", plural(bins))));
     }
     lines.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
     lines.push(("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core)));

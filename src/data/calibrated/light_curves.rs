@@ -5,6 +5,7 @@ use crate::data::dataset::is_within;
 use crate::data::io::light_curve::{Measurements, fitting};
 use crate::field::Lifetime;
 use crate::model::Parameter;
+use crate::numerics::text::plural;
 use crate::star::observation::Observations;
 use crate::surface::photometry::{Flux, LightCurve, bin_width_d, outliers};
 use sha2::{Digest, Sha256};
@@ -185,7 +186,7 @@ impl Binned {
     pub fn line(&self) -> String {
         let LightCurve { name, bins, segments, .. } = &self.curve;
         let sigma = bins.iter().map(|bin| bin.sigma).sum::<f64>() / bins.len() as f64;
-        let counted = |count: usize, one: &str| format!("{count} {one}{}", if count == 1 { "" } else { "s" });
+        let counted = |count: usize, one: &str| format!("{count} {one}{}", plural(count));
         let (bins, segments) = (counted(bins.len(), "bin"), counted(*segments, "segment"));
         let left_out = match self.left_out {
             0 => String::new(),

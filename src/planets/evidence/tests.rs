@@ -52,8 +52,11 @@ fn a_few_directions_are_enough() {
                     ln_along_ray(direction.dot(&(a * direction)), b.dot(&direction), &prior.k)
                 });
                 let wanted = ln_sum(&rays.collect::<Vec<_>>()) - (MANY as f64).ln();
-                let found = ln_over_k_and_phase(&a, &b, &prior.k);
-                assert!((found - wanted).abs() < 1e-5, "{sigma} {ratio} {k} {phase}: {found} {wanted}");
+                // with the closed form along lines, and ray by ray in panels
+                for (uniform, most) in [(true, 1e-6), (false, 1e-4)] {
+                    let found = ln_over_k_and_phase(&a, &b, &Density { uniform, ..prior.k });
+                    assert!((found - wanted).abs() < most, "{uniform} {sigma} {ratio} {k} {phase}: {found} {wanted}");
+                }
             }
         }
     });

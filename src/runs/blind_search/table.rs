@@ -7,7 +7,7 @@ use super::record::{
 };
 use crate::inference::detection::HeldOut;
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
-use crate::numerics::text::{Align, aligned, columns};
+use crate::numerics::text::{Align, aligned, columns, plural};
 use crate::planets::verdict::{decimals, extrapolated, false_alarm, probability, speed};
 use crate::surface::ConstantVelocity;
 
@@ -153,10 +153,6 @@ impl PeriodogramFile {
         };
         OrbitQuantity::ALL.into_iter().filter_map(row).collect()
     }
-}
-
-fn plural(count: usize) -> &'static str {
-    if count > 1 { "s" } else { "" }
 }
 
 /// Descriptions of the names in the table of orbits, one line each.

@@ -22,8 +22,9 @@ const TRIALS: usize = 64;
 /// in ln L holds a walker for e^d steps.
 const WIDE: usize = 32;
 
-/// Its temperature: the divisor of differences of ln L. At 2.5 the largest d in three chains was 2.7, at 4 (where one
-/// round was judged enough) 8.9, at 3 it was 3.2; without the draws of the last test as places it was 3.3 at 2.5.
+/// Its temperature: the divisor of differences of ln L. The largest d of three chains was 2.7, 1.4 and 1.1 at 2.5; 1.3,
+/// 0.6 and 3.2 at 3; 1.1, 8.9 and 2.6 at 4, where one round fewer was enough for the second. Without the draws of the
+/// last test as places it was 3.3, 1.7 and 1.6 at 2.5.
 const TEMPERATURE: f64 = 3.0;
 
 /// Largest number of rounds after the first.
