@@ -246,7 +246,7 @@ impl Evidence {
         let mut units = DMatrix::zeros(self.numbers.rows.nrows(), numbers.len());
         numbers.iter().enumerate().for_each(|(column, row)| units[(*row, column)] = 1.0);
         self.covariance.forward_from(&mut units, numbers);
-        Factor::new(dense::gram_of_columns(&units)).ok_or(FieldError::NotPositive)
+        Factor::new(dense::gram_of_columns(units.as_view())).ok_or(FieldError::NotPositive)
     }
 
     /// Misfits and slopes of all epochs in the numbers of these.
@@ -283,7 +283,8 @@ impl Covariance {
 fn quadratic(covariance: &Covariance, whitened: &DMatrix<f64>, epochs: &[Compressed], told: &[Told]) -> Quadratic {
     let (residual, slopes) = (whitened.column(0), whitened.columns_range(1..));
     let mut gradient = slopes.tr_mul(&residual);
-    let mut information = slopes.transpose() * slopes;
+    let mut information = dense::gram_of_columns(slopes);
+    information.fill_upper_triangle_with_lower_triangle();
     let mut ln_evidence = -0.5 * (residual.norm_squared() + covariance.ln_determinant());
     for (k, (of, epoch)) in told.iter().zip(epochs).enumerate() {
         let per_epoch = of.slopes.ncols();

@@ -30,6 +30,9 @@ const AT_ONCE: usize = 64;
 /// Columns of the states' covariance that are updated at once, to stay in the cache.
 const COLUMNS: usize = 32;
 
+/// Columns that are solved for at once, whose states stay in the cache.
+const SOLVED: usize = 64;
+
 /// The factor L, an epoch at a time.
 #[derive(Clone, Debug)]
 pub struct Filter {
@@ -100,12 +103,12 @@ impl Passage {
     }
 
     /// States (states, columns) an epoch later.
-    fn forward(&self, states: &mut DMatrix<f64>, rates: usize) {
+    fn forward(&self, states: &mut DMatrixViewMut<f64>, rates: usize) {
         mix_all(states, rates, self.factors());
     }
 
     /// The transpose of that.
-    fn backward(&self, states: &mut DMatrix<f64>, rates: usize) {
+    fn backward(&self, states: &mut DMatrixViewMut<f64>, rates: usize) {
         mix_all(states, rates, [self.value[0], self.rate[0], self.value[1], self.rate[1]]);
     }
 }
@@ -118,14 +121,10 @@ fn mix(rates: &mut [f64], values: &mut [f64], [vv, vw, wv, ww]: [f64; 4]) {
 }
 
 /// The same of all columns of states (states, columns), rates first.
-fn mix_all(states: &mut DMatrix<f64>, rates: usize, factors: [f64; 4]) {
-    if rates == 0 {
-        return;
-    }
-    let rows = states.nrows();
-    for column in states.as_mut_slice().chunks_exact_mut(rows) {
-        let (w, v) = column.split_at_mut(rates);
-        mix(w, v, factors);
+fn mix_all(states: &mut DMatrixViewMut<f64>, rates: usize, factors: [f64; 4]) {
+    for mut column in states.column_iter_mut() {
+        let (rates, values) = column.as_mut_slice().split_at_mut(rates);
+        mix(rates, values, factors);
     }
 }
 
@@ -248,10 +247,17 @@ impl Filter {
         // the first epoch in the order of time in which a column is not zero
         let first = |start: &usize| self.steps.iter().position(|step| step.part.end > *start).unwrap_or(0);
         let first: Vec<usize> = starts.iter().map(first).collect();
+        let n = b.nrows();
+        let blocks = b.as_mut_slice().par_chunks_mut((SOLVED * n).max(1)).zip(first.par_chunks(SOLVED));
+        blocks.for_each(|(b, first)| self.forward_of(DMatrixViewMut::from_slice(b, n, first.len()), first));
+    }
+
+    /// The same for a few columns, zero before these epochs in the order of time.
+    fn forward_of(&self, mut b: DMatrixViewMut<f64>, first: &[usize]) {
         let mut states = DMatrix::zeros(self.states, b.ncols());
         for (number, step) in self.steps.iter().enumerate() {
             let columns = first.partition_point(|first| *first <= number);
-            let mut active = states.columns_mut(0, columns).into_owned();
+            let mut active = states.columns_mut(0, columns);
             if step.passed > 0.0 {
                 Passage::after(step.passed).forward(&mut active, self.rates);
             }
@@ -260,12 +266,18 @@ impl Filter {
             let whitened = &step.inverse * rows.clone_owned();
             rows.copy_from(&whitened);
             active.gemm(1.0, &step.gain, &whitened, 1.0);
-            states.columns_mut(0, columns).copy_from(&active);
         }
     }
 
     /// `L^-T B` in place of B (n, columns).
     pub fn backward(&self, b: &mut DMatrix<f64>) {
+        let n = b.nrows();
+        let blocks = b.as_mut_slice().par_chunks_mut((SOLVED * n).max(1));
+        blocks.for_each(|b| self.backward_of(DMatrixViewMut::from_slice(b, n, b.len() / n)));
+    }
+
+    /// The same for a few columns.
+    fn backward_of(&self, mut b: DMatrixViewMut<f64>) {
         let mut states = DMatrix::zeros(self.states, b.ncols());
         for step in self.steps.iter().rev() {
             let mut rows = b.rows_range_mut(step.part.clone());
@@ -274,7 +286,7 @@ impl Filter {
             rows.copy_from(&whitened);
             states.rows_range_mut(self.rates..).gemm_tr(-1.0, &step.seen, &whitened, 1.0);
             if step.passed > 0.0 {
-                Passage::after(step.passed).backward(&mut states, self.rates);
+                Passage::after(step.passed).backward(&mut states.as_view_mut(), self.rates);
             }
         }
     }
@@ -298,7 +310,7 @@ fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f
 /// turned towards the largest by two products with `rows^T rows` (Halko, Martinsson & Tropp 2011). `None` where that is
 /// not finite.
 fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let mut products = dense::gram_of_columns(rows);
+    let mut products = dense::gram_of_columns(rows.as_view());
     products.fill_upper_triangle_with_lower_triangle();
     let all = products.trace();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
