@@ -267,14 +267,14 @@ impl Periodogram {
     fn inclusion(&self) -> Vec<Inclusion> {
         let half = ((0.5 / self.time_base / self.width).round() as usize).max(1);
         // equal prior probabilities of none and one planet
-        let one = 1.0 / (1.0 + (-self.ln_z).exp());
+        let (none, one) = (1.0 / (1.0 + self.ln_z.exp()), 1.0 / (1.0 + (-self.ln_z).exp()));
         let posterior: Vec<f64> = self.ln_cells.iter().map(|x| one * (x - self.ln_z).exp()).collect();
         let mut before = vec![0.0];
         posterior.iter().for_each(|p| before.push(before[before.len() - 1] + p));
-        let within = |cell: usize| {
-            let (from, to) = (cell.saturating_sub(half), (cell + half + 1).min(posterior.len()));
-            before[to] - before[from]
-        };
+        let ends = |cell: usize| (cell.saturating_sub(half), (cell + half + 1).min(posterior.len()));
+        let within = |cell: usize| before[ends(cell).1] - before[ends(cell).0];
+        // one minus that would be rounding error where the planet is sure
+        let outside = |cell: usize| none + before[ends(cell).0] + posterior[ends(cell).1..].iter().sum::<f64>();
         let mut cells: Vec<usize> = (0..posterior.len()).collect();
         cells.sort_by(|a, b| within(*b).total_cmp(&within(*a)));
         let mut told: Vec<usize> = Vec::new();
@@ -289,7 +289,7 @@ impl Periodogram {
         told.into_iter()
             .map(|cell| Inclusion {
                 porb_over_prot: 1.0 / self.frequency(cell),
-                false_inclusion_probability: (1.0 - within(cell)).max(0.0),
+                false_inclusion_probability: outside(cell),
             })
             .collect()
     }

@@ -168,6 +168,15 @@ fn a_planet_is_included_where_it_is() {
     assert!(found.ellipse.ln_bayes < found.circle.ln_bayes + 2.0, "{found:?}");
 }
 
+/// At least as improbable as no planet at all, and no rounding error.
+#[test]
+fn a_sure_planet_is_hardly_anywhere_else() {
+    let quadratic = star(0.75, 1.7, 5);
+    let found = with_priors([[0.8, 4.0]; 2], 0.9, |priors| evidence(&Jitters::none(&quadratic), priors, 1).unwrap());
+    let (none, probability) = ((-found.circle.ln_bayes).exp(), found.inclusion[0].false_inclusion_probability);
+    assert!(none < 1e-20 && (none..1e-16).contains(&probability), "{none:e} {probability:e}");
+}
+
 /// Gradients without a planet have the information as covariance: hardly any of 200 such stars has a Bayes factor above
 /// 150. Takes tens of minutes on one core.
 #[test]
