@@ -5,7 +5,7 @@
 //! periods are one matrix, times a square root of the information, times the deviates. Each block of draws has its own
 //! stream of random numbers, so that the number of threads does not matter.
 
-use super::jitter::{Jitters, Level};
+use super::jitter::{Jitters, Level, root};
 use super::orbits::{Trial, design, scan};
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
@@ -22,15 +22,15 @@ const ROWS: usize = 1024;
 /// The highest Delta ln L over the trial frequencies of each of `draws` gradients, with the best jitter without an
 /// orbit and with each.
 pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Vec<f64> {
-    heights(jitters, &|level| whitened(level, frequencies), highest, draws, seed)
+    heights(jitters, &|level, root| whitened(level, root, frequencies), highest, draws, seed)
 }
 
 /// Delta ln L of the amplitude of the velocities `unit` for each of `draws` gradients, 0 for a negative amplitude; the
 /// jitter as for [`maxima`].
 pub fn amplitudes(jitters: &Jitters, unit: &DVector<f64>, draws: usize, seed: u64) -> Vec<f64> {
-    let row = |level: &Level| {
+    let row = |level: &Level, root: &DMatrix<f64>| {
         let information = unit.dot(&(&level.quadratic.information * unit));
-        let row = &level.root * unit / information.sqrt();
+        let row = root * level.kept.tr_mul(unit) / information.sqrt();
         DMatrix::from_row_slice(1, row.len(), row.as_slice())
     };
     heights(jitters, &row, above_zero, draws, seed)
@@ -39,13 +39,16 @@ pub fn amplitudes(jitters: &Jitters, unit: &DVector<f64>, draws: usize, seed: u6
 /// Delta ln L of each of `draws` gradients: without a jitter, `of` applied to the rows of its level and the deviates.
 fn heights(
     jitters: &Jitters,
-    rows: &dyn Fn(&Level) -> DMatrix<f64>,
+    rows: &dyn Fn(&Level, &DMatrix<f64>) -> DMatrix<f64>,
     of: fn(&DMatrix<f64>, &DMatrix<f64>) -> Vec<f64>,
     draws: usize,
     seed: u64,
 ) -> Vec<f64> {
-    let rows: Vec<DMatrix<f64>> = jitters.levels.iter().map(rows).collect();
-    let profiles = jitters.levels[0].quadratic.len();
+    // from deviates to the gradient, symmetric
+    let root = root(&jitters.covariance);
+    let rows: Vec<DMatrix<f64>> = jitters.levels.iter().map(|level| rows(level, &root)).collect();
+    let alone: Vec<DMatrix<f64>> = jitters.levels.iter().map(|level| &level.solved * &root).collect();
+    let profiles = root.nrows();
     let block = |block: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(block as u64);
@@ -55,10 +58,10 @@ fn heights(
             return of(&rows[0], &deviates);
         }
         let (mut without, mut with) = (vec![f64::NEG_INFINITY; size], vec![f64::NEG_INFINITY; size]);
-        for (level, rows) in jitters.levels.iter().zip(&rows) {
-            let squares = (&level.rotation * &deviates).map(|amplitude| amplitude * amplitude);
+        for (level, (rows, alone)) in jitters.levels.iter().zip(rows.iter().zip(&alone)) {
+            let amplitudes = alone * &deviates;
             for (k, highest) in of(rows, &deviates).into_iter().enumerate() {
-                let alone = level.constant + level.squares.dot(&squares.column(k));
+                let alone = level.constant + 0.5 * amplitudes.column(k).norm_squared();
                 without[k] = without[k].max(alone);
                 with[k] = with[k].max(alone + highest);
             }
@@ -87,12 +90,12 @@ fn above_zero(row: &DMatrix<f64>, deviates: &DMatrix<f64>) -> Vec<f64> {
 }
 
 /// `L^-1 X' S` of all periods, two rows each, S S' being the covariance of the gradient.
-fn whitened(level: &Level, frequencies: &[f64]) -> DMatrix<f64> {
+fn whitened(level: &Level, root: &DMatrix<f64>, frequencies: &[f64]) -> DMatrix<f64> {
     let trials = scan(&level.quadratic, frequencies);
     let bounded: Vec<(f64, [f64; 3])> =
         trials.iter().filter_map(|trial| Some((trial.frequency, factor(trial)?))).collect();
     let frequencies: Vec<f64> = bounded.iter().map(|trial| trial.0).collect();
-    let mut columns = &level.root * design(&level.quadratic.cycles, &frequencies);
+    let mut columns = root * (level.kept.transpose() * design(&level.quadratic.cycles, &frequencies));
     for (j, (_, [a, below, b])) in bounded.into_iter().enumerate() {
         for i in 0..columns.nrows() {
             let first = columns[(i, 2 * j)] / a;

@@ -215,17 +215,10 @@ impl<'a> Field<'a> {
 
 impl Size {
     fn new(scatter: Scatter, beside: &Beside, without: &VelocityQuadratic, all: &Frequencies) -> Self {
-        let left = beside.left(&without.information);
-        let information = &left * &without.information;
-        let quadratic = VelocityQuadratic {
-            cycles: without.cycles.clone(),
-            gradient: DVector::zeros(without.len()),
-            information: 0.5 * (&information + information.transpose()),
-        };
-        let trials = scan(&quadratic, &all.per_cycle);
+        let trials = scan(&beside.likelihood(without), &all.per_cycle);
         Size {
             scatter,
-            left,
+            left: beside.kept(),
             factors: trials.iter().map(|trial| factor(trial).unwrap_or(UNBOUNDED)).collect(),
             constant: beside.constant,
             directions: &beside.solved * std::f64::consts::FRAC_1_SQRT_2,

@@ -43,6 +43,8 @@ pub struct Jitters {
     pub(super) ln_shares: Vec<f64>,
     /// The noise of stars without a planet, where it includes nightly offsets.
     pub(super) null: Option<Scatter>,
+    /// Covariance of the gradient, without jitter, of a star without a planet.
+    pub(super) covariance: DMatrix<f64>,
 }
 
 /// One size.
@@ -52,13 +54,12 @@ pub struct Level {
     pub quadratic: VelocityQuadratic,
     /// ln L at velocities 0, including the prior of the size, relative to the best size.
     pub ln_l: f64,
-    /// Transposed: from deviates to the gradient of a star without a planet.
-    pub(super) root: DMatrix<f64>,
-    /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
+    /// ln L at velocities 0 of a star without a planet: a constant, and half of the squared norm of its gradient,
+    /// `solved`; without rows in the absence of jitter.
     pub(super) constant: f64,
-    pub(super) squares: DVector<f64>,
-    /// From deviates to these amplitudes; without rows in the absence of jitter.
-    pub(super) rotation: DMatrix<f64>,
+    pub(super) solved: DMatrix<f64>,
+    /// From gradients without jitter to those with it.
+    pub(super) kept: DMatrix<f64>,
 }
 
 /// A trial period with the best jitter for its orbit.
@@ -83,15 +84,15 @@ impl BestTrial {
 impl Jitters {
     /// No jitter.
     pub fn none(quadratic: &VelocityQuadratic) -> Self {
+        let n = quadratic.len();
         let level = Level {
             quadratic: quadratic.clone(),
             ln_l: 0.0,
-            root: root(&quadratic.information),
             constant: 0.0,
-            squares: DVector::zeros(0),
-            rotation: DMatrix::zeros(0, 0),
+            solved: DMatrix::zeros(0, n),
+            kept: DMatrix::identity(n, n),
         };
-        Jitters { levels: vec![level], ln_shares: vec![0.0], null: None }
+        Jitters { levels: vec![level], ln_shares: vec![0.0], null: None, covariance: quadratic.information.clone() }
     }
 
     /// Jitters added to the quadratic `without` one; `found_kms` is the standard deviation (km/s) found without a
@@ -100,8 +101,6 @@ impl Jitters {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
         let among = |d: DVector<f64>| &u * DMatrix::from_diagonal(&d) * u.transpose();
-        // the gradient of a star without a planet has this standard deviation along each eigenvector
-        let sd = lambda.map(|l| (l + (found_kms * l).powi(2)).sqrt());
         let pulled = u.tr_mul(&without.gradient);
         let level = |size: f64| {
             let variance = (size * found_kms).powi(2);
@@ -115,16 +114,16 @@ impl Jitters {
                     gradient: &u * pulled.component_mul(&left),
                     information: 0.5 * (&information + information.transpose()),
                 },
-                root: among(sd.component_mul(&left)),
                 constant,
-                squares: left.component_mul(&sd.map(|sd| 0.5 * variance * sd * sd)),
-                rotation: u.transpose(),
+                solved: DMatrix::from_diagonal(&left.map(|left| (variance * left).sqrt())) * u.transpose(),
+                kept: among(left),
             }
         };
         let mut levels = SIZES.map(level).to_vec();
         let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
         levels.iter_mut().for_each(|level| level.ln_l -= best);
-        Jitters { levels, ln_shares: ln_shares(&SIZES), null: None }
+        let covariance = among(lambda.map(|l| l + (found_kms * l).powi(2)));
+        Jitters { levels, ln_shares: ln_shares(&SIZES), null: None, covariance }
     }
 
     /// ln L of no planet at each size, weighted by a prior that is uniform up to the largest.

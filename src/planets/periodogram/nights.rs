@@ -8,7 +8,7 @@
 //! values that are the most likely without one.
 
 use super::draws::amplitudes;
-use super::jitter::{Jitters, Level, Scatter, ln_prior, ln_shares, root};
+use super::jitter::{Jitters, Level, Scatter, ln_prior, ln_shares};
 use super::{FalseAlarm, Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
@@ -154,7 +154,8 @@ pub(super) fn beside(
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
     let of_jitter = ln_shares(&jitters);
     let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
-    Some(Jitters { levels: levels(without, &of(null)?, &all?), ln_shares: shares.collect(), null: Some(null) })
+    let (levels, covariance) = levels(without, &of(null)?, all?);
+    Some(Jitters { levels, ln_shares: shares.collect(), null: Some(null), covariance })
 }
 
 /// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).
@@ -233,6 +234,8 @@ pub(super) struct Beside {
     columns: DMatrix<f64>,
     /// `C^-1 L'`, `A = C C'`: M is its square.
     pub solved: DMatrix<f64>,
+    /// `I L C'^-1`.
+    moved: DMatrix<f64>,
     /// `-ln det A / 2`, including the prior.
     pub constant: f64,
     /// ln L at velocities 0, including the prior, relative to that without jitter and offsets.
@@ -253,47 +256,47 @@ impl Beside {
         let mut columns = DMatrix::zeros(n, jitter + nights);
         (0..jitter).for_each(|k| columns[(k, k)] = jitter_kms);
         columns.columns_mut(jitter, nights).copy_from(&(of_night.columns(0, nights) * night_kms));
-        let inner = columns.tr_mul(&(&without.information * &columns));
+        let turned = columns.transpose();
+        let inner = &turned * (&without.information * &columns);
         let inner = DMatrix::identity(jitter + nights, jitter + nights) + 0.5 * (&inner + inner.transpose());
         let factor = inner.cholesky()?.unpack();
-        let solved = factor.solve_lower_triangular(&columns.transpose())?;
+        let solved = factor.solve_lower_triangular(&turned)?;
+        let moved = &without.information * solved.transpose();
         let prior = ln_prior(jitter_kms, scale_kms) + reach.ln_prior(night_kms, scale_kms);
         let constant = prior - factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let height = constant + 0.5 * (&solved * &without.gradient).norm_squared();
-        Some(Beside { columns, solved, constant, height })
+        Some(Beside { columns, solved, moved, constant, height })
     }
 
     /// From gradients without the noise to those with it.
-    pub fn left(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
-        let n = information.nrows();
-        DMatrix::identity(n, n) - information * self.solved.tr_mul(&self.solved)
+    pub fn kept(&self) -> DMatrix<f64> {
+        let n = self.moved.nrows();
+        DMatrix::identity(n, n) - &self.moved * &self.solved
     }
 
-    /// The likelihood of the velocities with this noise, where gradients of stars without a planet have that `root`.
-    fn level(&self, without: &VelocityQuadratic, root: &DMatrix<f64>, best: f64) -> Level {
-        let kept = self.left(&without.information);
-        let information = &kept * &without.information;
-        Level {
-            quadratic: VelocityQuadratic {
-                cycles: without.cycles.clone(),
-                gradient: &kept * &without.gradient,
-                information: 0.5 * (&information + information.transpose()),
-            },
-            ln_l: self.height - best,
-            root: root * kept.transpose(),
-            constant: self.constant,
-            squares: DVector::from_element(self.solved.nrows(), 0.5),
-            rotation: &self.solved * root,
+    /// The likelihood of the velocities with this noise.
+    pub fn likelihood(&self, without: &VelocityQuadratic) -> VelocityQuadratic {
+        VelocityQuadratic {
+            cycles: without.cycles.clone(),
+            gradient: &without.gradient - &self.moved * (&self.solved * &without.gradient),
+            information: &without.information - &self.moved * self.moved.transpose(),
         }
     }
 }
 
 /// The likelihood with `all` of these; stars without a planet are those of `null`.
-fn levels(without: &VelocityQuadratic, null: &Beside, all: &[Beside]) -> Vec<Level> {
-    let moved = &without.information * &null.columns;
-    let root = root(&(&without.information + &moved * moved.transpose()));
+fn levels(without: &VelocityQuadratic, null: &Beside, all: Vec<Beside>) -> (Vec<Level>, DMatrix<f64>) {
     let best = all.iter().map(|beside| beside.height).fold(f64::NEG_INFINITY, f64::max);
-    all.iter().map(|beside| beside.level(without, &root, best)).collect()
+    let level = |beside: Beside| Level {
+        quadratic: beside.likelihood(without),
+        ln_l: beside.height - best,
+        constant: beside.constant,
+        kept: beside.kept(),
+        solved: beside.solved,
+    };
+    let moved = &without.information * &null.columns;
+    let covariance = &without.information + &moved * moved.transpose();
+    (all.into_iter().map(level).collect(), covariance)
 }
 
 #[cfg(test)]

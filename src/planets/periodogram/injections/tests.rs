@@ -62,7 +62,7 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
                 if scatter.night_kms > 0.0 && null.night_kms == 0.0 {
                     continue;
                 }
-                let left = beside.left(&moved.information);
+                let left = beside.kept();
                 let here = VelocityQuadratic {
                     gradient: &left * &moved.gradient,
                     information: &left * &moved.information,

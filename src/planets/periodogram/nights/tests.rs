@@ -1,5 +1,6 @@
 //! Nightly offsets against the covariance of velocities, and the false-alarm probability with them.
 
+use super::super::jitter::root;
 use super::super::sample;
 use super::super::{Frequencies, FrequencySettings, Search};
 use super::*;
@@ -47,7 +48,7 @@ fn the_offsets_add_to_the_covariance() {
     let all = scatters(&[0.0, 0.02], &[0.0, 0.07]);
     assert_eq!(all.len(), 4);
     let beside = |scatter: &Scatter| Beside::new(&velocities, &nights, *scatter, (None, Reach::Any)).unwrap();
-    let levels = levels(&velocities, &beside(&all[2]), &all.iter().map(beside).collect::<Vec<_>>());
+    let (levels, covariance) = levels(&velocities, &beside(&all[2]), all.iter().map(beside).collect());
     let null = density(all[2]).2;
     for (scatter, level) in all.iter().zip(levels) {
         let (ln_l, inverse, _) = density(*scatter);
@@ -57,7 +58,8 @@ fn the_offsets_add_to_the_covariance() {
         assert!((&level.quadratic.gradient - &inverse * &rv).norm() < 1e-8 * (&inverse * &rv).norm(), "{scatter:?}");
         // gradients of a star of the null
         let expected = &inverse * &null * &inverse;
-        assert!((level.root.tr_mul(&level.root) - &expected).norm() < 1e-8 * expected.norm(), "{scatter:?}");
+        let drawn = &level.kept * &covariance * level.kept.transpose();
+        assert!((drawn - &expected).norm() < 1e-8 * expected.norm(), "{scatter:?}");
     }
 }
 
@@ -140,16 +142,16 @@ fn amplitudes_have_the_variance_of_the_gradient() {
         let scatter = Scatter { jitter_kms: 0.0, night_kms };
         Beside::new(&velocities, &nights, scatter, (None, Reach::Any)).unwrap()
     };
-    let levels = levels(&velocities, &of(0.3), &[of(0.15)]);
+    let (levels, found) = levels(&velocities, &of(0.3), vec![of(0.15)]);
     let of_level = &levels[0].quadratic.information;
     let unit = sample::orbit(&cycles, 1.0, 1.7, 0.9);
     let nights_kms2 = &nights.0 * nights.0.transpose() * 0.09;
     let covariance = velocities.information.clone().try_inverse().unwrap() + nights_kms2;
     let pulled = of_level * &unit;
     let expected = pulled.dot(&(&covariance * &pulled)) / unit.dot(&pulled);
-    let transposed = levels[0].root.tr_mul(&unit).norm_squared() / unit.dot(&pulled);
+    let transposed = (root(&found) * &levels[0].kept * &unit).norm_squared() / unit.dot(&pulled);
     assert!((transposed / expected - 1.0).abs() > 0.15, "{transposed} {expected}: does not tell");
-    let jitters = Jitters { levels, ln_shares: vec![0.0], null: None };
+    let jitters = Jitters { levels, ln_shares: vec![0.0], null: None, covariance: found };
     // half of the amplitudes are above zero, where Delta ln L is half of their square
     let drawn = amplitudes(&jitters, &unit, 20_000, 1);
     let variance = 4.0 * drawn.iter().sum::<f64>() / drawn.len() as f64;
