@@ -30,7 +30,7 @@ pub fn product_with_transpose(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64
 pub fn gram_of_columns(a: DMatrixView<f64>) -> DMatrix<f64> {
     let m = a.ncols();
     let mut product = DMatrix::zeros(m, m);
-    // so many columns are not all zero down to a row
+    // the first row in which this column or a later one is not zero
     let mut begin = vec![a.nrows(); m];
     for k in (0..m).rev() {
         let later = begin.get(k + 1).copied().unwrap_or(a.nrows());
