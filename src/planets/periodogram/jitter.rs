@@ -54,8 +54,8 @@ pub struct Level {
     pub quadratic: VelocityQuadratic,
     /// ln L at velocities 0, including the prior of the size, relative to the best size.
     pub ln_l: f64,
-    /// ln L at velocities 0 of a star with gradient g (without jitter) is `constant + |solved g|^2 / 2`; without rows in
-    /// the absence of jitter.
+    /// ln L at velocities 0 of a star with gradient g (without jitter) is `constant + |solved g|^2 / 2`; without rows
+    /// where there is no jitter.
     pub(super) constant: f64,
     pub(super) solved: DMatrix<f64>,
     /// From gradients without jitter to those with it.
