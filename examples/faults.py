@@ -10,7 +10,7 @@ Every command that writes is run on a small star with two data sets, once to its
 fresh copy of what it reads, and cut short after a random share of that time:
 
 - `--kill`: by SIGKILL; `--kill-python` kills a Python process in which the function of the package runs, `--kill-rank`
-  one of two MPI ranks, of a program with the feature `mpi`;
+  one of two MPI ranks, of the program `dimcmc-mpi`;
 - `--full-disk`: the disk is full after a random share of what the command writes, and has room again afterwards;
 - `--at-once`: a second process is started on the same folder, every other time both with `--force`;
 - `--clock`: the clock jumps by ten years, or to before 1970, with results kept from run to run (`DIMCMC_CACHE`).

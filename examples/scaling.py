@@ -2,8 +2,8 @@
 
 Events are those of the program: rank 0 proposes for one half of all walkers, hands the vectors out, some ahead while
 there are many, takes the answers as they come, decides and writes; then the other half. Durations are measured by
-`cargo bench --bench ranks
---features mpi` (the last tables and line). Prints the tables of results/scaling.md. Needs Python alone.
+`cargo bench -p dimcmc-mpi --bench ranks --features mpi` (the last tables and line). Prints the tables of
+results/scaling.md. Needs Python alone.
 """
 
 import heapq

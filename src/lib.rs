@@ -121,7 +121,7 @@ pub mod internals {
     #![allow(missing_docs)]
     // what another program needs to behave like the commands
     pub mod cli {
-        pub use crate::cli::{Global, cluster, console, progress, signals};
+        pub use crate::cli::{Global, cluster, console, main, progress, signals};
     }
     pub mod data {
         pub use crate::data::*;
@@ -161,7 +161,7 @@ pub mod internals {
     }
 }
 
-pub use cli::{Failure, first_config, main as command_line};
+pub use cli::{Failure, command_line, first_config};
 pub use data::config::{Config, ConfigError};
 pub use data::io::lsd::{LsdError, read_observations, write_numbers as write_observations};
 pub use data::scene::{Scene, SceneError};

@@ -54,7 +54,8 @@ impl Size {
 
 /// A file of this repository.
 pub fn file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    above.map(|folder| folder.join(name)).find(|path| path.exists()).expect("the benches are in the repository")
 }
 
 /// The scene, its start at the injected values.

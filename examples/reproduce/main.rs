@@ -74,7 +74,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
-    if cluster::join(&args.global)? == cluster::Done::Everything {
+    if cluster::join(&args.global, cluster::alone)? == cluster::Done::Everything {
         return Ok(());
     }
     let rows = rows(&args.rows)?;

@@ -13,7 +13,7 @@ list=$1 out=$2
 export OMPI_MCA_odls_base_sigkill_timeout=0
 # stars that are done are left alone, those that were stopped go on
 # the warning comes to this script, which hands it on
-${MPIRUN:-mpirun} dimcmc batch "$list" --out "$out" &
+${DIMCMC:-mpirun dimcmc-mpi} batch "$list" --out "$out" &
 pid=$!
 trap 'kill -USR1 $pid' USR1 TERM
 wait $pid

@@ -18,7 +18,7 @@ resume=()
 [ -e "$run/manifest.json" ] && resume=(--resume)
 
 # the warning comes to this script, which hands it on
-${MPIRUN:-mpirun} dimcmc sample "$config" --out "$run" ${resume[@]+"${resume[@]}"} &
+${DIMCMC:-mpirun dimcmc-mpi} sample "$config" --out "$run" ${resume[@]+"${resume[@]}"} &
 pid=$!
 trap 'kill -USR1 $pid' USR1 TERM
 wait $pid

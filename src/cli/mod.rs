@@ -69,9 +69,8 @@ pub struct Global {
     /// No progress bar
     #[arg(long, short, global = true, help_heading = GENERAL)]
     quiet: bool,
-    #[cfg(feature = "mpi")]
     #[arg(skip)]
-    ranks: cluster::Ranks,
+    ranks: cluster::Others,
 }
 
 /// More threads than processors of any machine: the system would take minutes to create them, or fail.
@@ -115,17 +114,22 @@ fn command() -> clap::Command {
     groups::grouped(Cli::command())
 }
 
-/// The whole program: reads its `arguments`, the name of the program first, runs the command, prints errors. Returns
-/// the exit code.
+/// The whole program on one machine: reads its `arguments`, the name of the program first, runs the command, prints
+/// errors. Returns the exit code.
 ///
 /// Prints help or the error in the arguments and exits, if nothing else is to be done.
-pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+pub fn command_line(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    main(arguments, cluster::alone)
+}
+
+/// The same as one of several processes.
+pub fn main(arguments: impl IntoIterator<Item = OsString>, join: cluster::Join) -> u8 {
     let matches = match command().try_get_matches_from(arguments) {
         Ok(matches) => matches,
         Err(error) => return misused(&error),
     };
     match Cli::from_arg_matches(&matches) {
-        Ok(cli) => console::end(run(&cli)),
+        Ok(cli) => console::end(run(&cli, join)),
         Err(error) => misused(&error),
     }
 }
@@ -172,8 +176,8 @@ fn has_moved(error: &clap::Error) -> Option<Failure> {
 }
 
 /// Runs the command.
-fn run(cli: &Cli) -> Result<(), Failure> {
-    if cluster::join(&cli.global)? == cluster::Done::Everything {
+fn run(cli: &Cli, join: cluster::Join) -> Result<(), Failure> {
+    if cluster::join(&cli.global, join)? == cluster::Done::Everything {
         return Ok(());
     }
     match &cli.command {

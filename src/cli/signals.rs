@@ -65,7 +65,6 @@ impl Signals {
     }
 
     /// Catches the signals without an effect: another process decides when to stop.
-    #[cfg(feature = "mpi")]
     pub fn ignore() -> Result<Self, Failure> {
         let signals = Signals::catch("answer")?;
         signals.defer();

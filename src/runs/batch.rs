@@ -9,9 +9,8 @@ use crate::inference::search;
 use crate::planets::verdict::Verdict;
 use crate::runs::fitted::fitted;
 use crate::runs::manifest::{self, Manifest, RunSummary};
-#[cfg(feature = "mpi")]
-use crate::runs::pool::orbit_from_bytes;
-use crate::runs::pool::{Answer, Brief, Pool, Question};
+use crate::runs::pool::ranks::Answering;
+use crate::runs::pool::{Answer, Brief, Pool, Question, TaskError, orbit_from_bytes};
 use crate::runs::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
 use crate::sampling::chain::ParameterSummary;
 use serde::{Deserialize, Serialize};
@@ -187,8 +186,7 @@ impl Answer for End {
 ///
 /// # Errors
 /// A density that cannot be built there.
-#[cfg(feature = "mpi")]
-pub fn learn(brief: &[u8]) -> Result<crate::runs::cluster::Answer<'static>, crate::runs::pool::TaskError> {
+pub fn learn(brief: &[u8]) -> Result<Answering<'static>, TaskError> {
     Ok(match Brief::from_bytes(brief).expect("a rank of this very program asks") {
         Brief::Density(task) => {
             let answer = task.answerer()?;

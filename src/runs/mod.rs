@@ -2,7 +2,7 @@
 //!
 //! In: a scene (`data::scene`), or the folder of an earlier command. Out: files of a folder.
 //!
-//! 1. [`pool`] distributes evaluations over threads, or over the ranks of a `cluster`.
+//! 1. [`pool`] distributes evaluations over threads, or over the ranks of a cluster.
 //! 2. [`mod@fitted`] is the fit of the star to the profiles, cached for the next command; [`origin`] and [`manifest`]
 //!    record how the results of a folder were begun.
 //! 3. [`run`] is a chain on disk, [`grid_scan`] a likelihood grid, [`optimum`] the maximum, [`maps`] the star there,
@@ -16,8 +16,6 @@
 
 pub mod batch;
 pub mod blind_search;
-#[cfg(feature = "mpi")]
-pub mod cluster;
 pub mod comparison;
 pub mod detection_limits;
 pub mod export;

@@ -114,7 +114,7 @@ fn start(desk: &Desk, name: &str, args: &[&str], variables: &[(&str, &str)]) -> 
     let folder = Path::new(env!("CARGO_BIN_EXE_dimcmc")).parent().unwrap();
     let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap());
     let mut bash = Command::new("bash");
-    bash.arg(script(name)).args(args).current_dir(desk.path("")).env("PATH", path).env("MPIRUN", "env");
+    bash.arg(script(name)).args(args).current_dir(desk.path("")).env("PATH", path).env("DIMCMC", "dimcmc");
     bash.envs(variables.iter().copied()).stdout(Stdio::piped()).stderr(Stdio::piped());
     bash.spawn().unwrap()
 }

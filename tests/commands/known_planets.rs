@@ -13,6 +13,9 @@ const K_KMS: [f64; 2] = [0.24, 0.16];
 fn config() -> Value {
     let mut star = star();
     star["mass_msun"] = json!(0.9);
+    // nothing is fitted that takes long
+    star["regions"] = json!({ "area": 0.0 });
+    star["fitted"] = json!([]);
     let normal = |mean: f64, sd: f64| json!({ "prior": "normal", "mean": mean, "sd": sd });
     json!({
         "star": star,
@@ -109,9 +112,6 @@ fn a_known_planet_is_compared_with_offsets_of_nights() {
     };
     desk.edit("data/observations.txt", |list| list.lines().map(with_offset).collect());
     star["observations"] = json!({ "path": "data/observations.txt" });
-    // nothing is fitted that takes long
-    star["star"]["regions"] = json!({ "area": 0.0 });
-    star["star"]["fitted"] = json!([]);
     star["imaging"]["pixels"] = json!(200);
     desk.write("star.json", &star.to_string());
     let said = desk.succeed(&["periodogram", "star.json", "--planets", "2", "--draws", "1000", "--out", "search"]);

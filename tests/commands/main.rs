@@ -7,6 +7,9 @@ mod python;
 #[path = "../common/svg.rs"]
 mod svg;
 
+/// The program.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dimcmc");
+
 mod batch;
 mod bright_and_dark;
 mod cli;

@@ -28,6 +28,12 @@ fn observed(regions: &Value) -> (Desk, Value) {
     (desk, config)
 }
 
+/// Tells the config what its spots are: where these are not tested, to fit them takes most of the time.
+fn with_known_spots(config: &mut Value, keys: &[&str]) {
+    let known = json!({ "spot_amplitude": 0.3, "spot_slope": 1.3, "spot_lifetime_d": 3000 });
+    keys.iter().for_each(|key| config["imaging"][key] = known[key].clone());
+}
+
 #[test]
 fn regions_are_found_where_they_are_and_nowhere_else() {
     let regions = json!({ "line_width": 1.5, "equivalent_width": 1.1, "shift_kms": 0.5, "area": 2.0,
@@ -54,7 +60,8 @@ fn regions_are_found_where_they_are_and_nowhere_else() {
 /// repeated, and nothing is stored where this is disabled.
 #[test]
 fn what_is_fitted_is_kept_for_the_next_command() {
-    let (desk, config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
+    let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
+    with_known_spots(&mut config, &["spot_lifetime_d"]);
     desk.write(CONFIG, &config.to_string());
     let map = |cache: &str, out: &str| {
         let mut command = program();
@@ -91,6 +98,7 @@ fn a_star_that_is_fitted_is_that_of_a_chain_that_goes_on() {
     config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
     config["star"]["vsini_kms"] = json!(25.6);
     config["star"]["fitted"] = json!(["line_sigma_kms", "vsini_kms"]);
+    with_known_spots(&mut config, &["spot_amplitude", "spot_slope", "spot_lifetime_d"]);
     config["parameters"] = json!({ "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
                                    "phi": { "prior": "periodic" } });
     desk.write(CONFIG, &config.to_string());
@@ -163,6 +171,7 @@ fn a_drift_is_told_with_its_error() {
 fn flares_are_found_and_no_others() {
     let (desk, mut config) = observed(&json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 }));
     config["star"]["regions"] = json!({ "area": 0, "area_limb": 0, "dimming_limb": 0 });
+    with_known_spots(&mut config, &["spot_lifetime_d"]);
     let list = desk.read("data/observations.txt");
     let files: Vec<(String, f64)> = (list.lines().filter(|line| !line.starts_with('#')))
         .map(|line| {

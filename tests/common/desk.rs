@@ -1,6 +1,7 @@
 //! The program as users run it, in a separate folder.
 #![allow(dead_code)]
 
+pub use crate::PROGRAM;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -48,9 +49,6 @@ pub fn tiny(steps: usize) -> Value {
     config["observations"]["simulate"]["pixels"] = json!(1000);
     config
 }
-
-/// The program.
-pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dimcmc");
 
 /// Copies a folder and all that is in it.
 pub fn copy(from: &Path, to: &Path) {

@@ -32,7 +32,6 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     (
         "runs",
         &[
-            "cluster",
             "fitted",
             "origin",
             "blind_search",

@@ -3,6 +3,9 @@
 #[path = "../common/desk.rs"]
 mod desk;
 
+/// The program.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dimcmc");
+
 mod architecture;
 mod config;
 mod docs;

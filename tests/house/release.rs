@@ -8,10 +8,10 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// `[workspace.package]` has the version; both crates take it from there, and files that cannot agree with it.
+/// `[workspace.package]` has the version; all crates take it from there, and files that cannot agree with it.
 #[test]
 fn the_version_is_written_once() {
-    for path in ["Cargo.toml", "python/Cargo.toml"] {
+    for path in ["Cargo.toml", "mpi/Cargo.toml", "python/Cargo.toml"] {
         let package = read(path);
         let package = package.split("\n[").find(|section| section.trim_start_matches('[').starts_with("package]"));
         assert!(package.unwrap().contains("\nversion.workspace = true\n"), "{path}: another version");
@@ -20,6 +20,7 @@ fn the_version_is_written_once() {
     for (path, line) in [
         ("Cargo.toml", format!("\nversion = \"{VERSION}\"\n")),
         ("Cargo.lock", format!("\nname = \"dimcmc\"\nversion = \"{VERSION}\"\n")),
+        ("Cargo.lock", format!("\nname = \"dimcmc-mpi\"\nversion = \"{VERSION}\"\n")),
         ("Cargo.lock", format!("\nname = \"dimcmc-python\"\nversion = \"{VERSION}\"\n")),
         ("CITATION.cff", format!("\nversion: {VERSION}\n")),
         ("python/conda/recipe.yaml", format!("\n  version: {VERSION}\n")),

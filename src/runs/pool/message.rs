@@ -34,7 +34,6 @@ impl Question for Orbit {
 }
 
 /// The orbit of a question; `None` for other bytes.
-#[cfg(feature = "mpi")]
 pub fn orbit_from_bytes(bytes: &[u8]) -> Option<Orbit> {
     let [k_kms, porb_over_prot, phi] = *numbers_from_bytes(bytes).first_chunk()?;
     Some(Orbit { k_kms, porb_over_prot, phi })

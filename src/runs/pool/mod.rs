@@ -2,21 +2,20 @@
 //! are independent of the backend.
 //!
 //! `target` passes a vector to the density of the surface model, `task` is the input with which another process
-//! evaluates the same to the bit, `message` encodes questions and answers as bytes.
+//! evaluates the same to the bit, `message` encodes questions and answers as bytes, `ranks` is what other processes
+//! have to do.
 
 mod message;
+pub mod ranks;
 mod target;
 mod task;
 
-#[cfg(feature = "mpi")]
-pub use message::orbit_from_bytes;
-pub use message::{Answer, Question};
+pub use message::{Answer, Question, orbit_from_bytes};
 pub use target::Target;
 pub use task::{Asked, Brief, Task, TaskError};
 
-#[cfg(feature = "mpi")]
-use crate::runs::cluster;
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity as _};
+use ranks::Ranks;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
@@ -35,8 +34,7 @@ enum Workers {
     #[default]
     Threads,
     /// The other ranks of a cluster.
-    #[cfg(feature = "mpi")]
-    Ranks(cluster::Queue),
+    Ranks(Box<dyn Ranks>),
 }
 
 impl Pool {
@@ -46,17 +44,15 @@ impl Pool {
     }
 
     /// The ranks of a cluster, until `stop` is set.
-    #[cfg(feature = "mpi")]
-    pub fn ranks(queue: cluster::Queue, stop: Arc<AtomicBool>) -> Self {
-        Pool { stop, workers: Workers::Ranks(queue) }
+    pub fn ranks(ranks: Box<dyn Ranks>, stop: Arc<AtomicBool>) -> Self {
+        Pool { stop, workers: Workers::Ranks(ranks) }
     }
 
     /// Number of concurrent reconstructions.
     pub fn size(&self) -> usize {
         match &self.workers {
             Workers::Threads => rayon::current_num_threads(),
-            #[cfg(feature = "mpi")]
-            Workers::Ranks(queue) => queue.size(),
+            Workers::Ranks(ranks) => ranks.size(),
         }
     }
 
@@ -124,7 +120,6 @@ impl Pool {
     }
 
     /// The answers of other processes or, where there are none, of `threads`.
-    #[cfg_attr(not(feature = "mpi"), allow(unused_variables))]
     fn by_ranks_or<Q: Question, A: Answer>(
         &self,
         brief: &[u8],
@@ -133,11 +128,10 @@ impl Pool {
     ) -> Vec<A> {
         match &self.workers {
             Workers::Threads => threads(),
-            #[cfg(feature = "mpi")]
-            Workers::Ranks(queue) => {
+            Workers::Ranks(ranks) => {
                 let questions: Vec<Vec<u8>> = questions.iter().map(Question::to_bytes).collect();
                 let read = |bytes: Vec<u8>| A::from_bytes(&bytes).expect("a rank of this very program answers");
-                queue.answers(brief, &questions, &self.stop).into_iter().map(read).collect()
+                ranks.answers(brief, &questions, &self.stop).into_iter().map(read).collect()
             }
         }
     }

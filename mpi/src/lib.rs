@@ -3,6 +3,9 @@
 //!
 //! A panic on any rank, on any thread, ends them all: otherwise the others would wait indefinitely. Waiting uses almost
 //! no processor time (`nap`).
+//!
+//! The library of the commands is compiled without MPI: it knows `runs::pool::ranks` alone.
+#![cfg(feature = "mpi")]
 
 mod hands;
 mod message;
@@ -11,12 +14,14 @@ mod queue;
 mod worker;
 
 pub use queue::Queue;
-pub use worker::{Answer, Worker};
+pub use worker::Worker;
+
+use dimcmc::internals::runs::pool::ranks;
 
 use mpi::environment::Universe;
 use mpi::topology::{Process, SimpleCommunicator};
 use mpi::traits::Communicator as _;
-use std::process::ExitCode;
+use std::error::Error;
 
 /// Exit code of a job that a panic ended, as that of a program that panics.
 const PANICKED: i32 = 101;
@@ -70,8 +75,20 @@ pub fn join(at_once: usize) -> Result<Rank, ClusterError> {
     })
 }
 
+/// [`join`] for the commands.
+///
+/// # Errors
+/// [`ClusterError`].
+pub fn rank(at_once: usize) -> Result<ranks::Rank, Box<dyn Error>> {
+    Ok(match join(at_once)? {
+        Rank::Only => ranks::Rank::Only,
+        Rank::First(queue) => ranks::Rank::First(Box::new(queue)),
+        Rank::Other(worker) => ranks::Rank::Other(Box::new(worker)),
+    })
+}
+
 /// Ends all ranks at once.
-pub fn abort(code: i32) -> ExitCode {
+fn abort(code: i32) {
     SimpleCommunicator::world().abort(code)
 }
 

@@ -5,7 +5,9 @@
 
 use super::message::{ANSWER, HELLO, ORDER, Order, number, numbered, question, split};
 use super::nap::{WHILE_IDLE, Wait, nap};
-use super::{Ranks, first};
+use super::{Ranks, abort, first};
+use dimcmc::internals::runs::pool::TaskError;
+use dimcmc::internals::runs::pool::ranks::{self, Answering, Learn};
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
 use mpi::topology::SimpleCommunicator;
@@ -16,9 +18,6 @@ use std::time::Duration;
 
 /// Longest delay of an order; questions do not wait for it.
 const UNHEARD: Duration = Duration::from_millis(5);
-
-/// Answers a question, from any thread; the flag is set when it should end soon.
-pub type Answer<'a> = Box<dyn Fn(&[u8], &Arc<AtomicBool>) -> Vec<u8> + Sync + 'a>;
 
 /// A rank that answers.
 pub struct Worker {
@@ -31,16 +30,11 @@ impl Worker {
         Worker { ranks: Ranks::new(universe), at_once }
     }
 
-    /// The number of this rank.
-    pub fn rank(&self) -> i32 {
-        self.ranks.world.rank()
-    }
-
     /// Answers until dismissed, with the function that `learn` returns for each brief.
     ///
     /// # Errors
     /// The error of `learn`; the other ranks then wait for this one, and must be ended.
-    pub fn serve<'a, E>(&self, learn: impl Fn(&[u8]) -> Result<Answer<'a>, E>) -> Result<(), E> {
+    pub fn answer_all<'a, E>(&self, learn: impl Fn(&[u8]) -> Result<Answering<'a>, E>) -> Result<(), E> {
         first(&self.ranks.world).send_with_tag(&number(self.at_once)[..], HELLO);
         let mut brief = self.wait(&AtomicBool::new(false));
         for number in 1.. {
@@ -51,7 +45,7 @@ impl Worker {
     }
 
     /// Answers questions on the brief of this number until the next one; `None` when dismissed.
-    fn answer(&self, answer: &Answer, brief: usize) -> Option<Vec<u8>> {
+    fn answer(&self, answer: &Answering, brief: usize) -> Option<Vec<u8>> {
         let (stop, over, ear) = (Arc::new(AtomicBool::new(false)), AtomicBool::new(false), Mutex::new(()));
         std::thread::scope(|scope| {
             for _ in 0..self.at_once {
@@ -92,6 +86,20 @@ impl Worker {
                 None => std::thread::sleep(UNHEARD),
             }
         }
+    }
+}
+
+impl ranks::Worker for Worker {
+    fn rank(&self) -> i32 {
+        self.ranks.world.rank()
+    }
+
+    fn serve(&self, learn: Learn) -> Result<(), TaskError> {
+        self.answer_all(learn)
+    }
+
+    fn abort(&self, code: i32) {
+        abort(code);
     }
 }
 

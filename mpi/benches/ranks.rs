@@ -4,6 +4,7 @@
 //!
 //! Starts itself by `mpirun`.
 
+#[path = "../../benches/common/mod.rs"]
 mod common;
 
 use common::paper::{Free, Size, scene};
@@ -12,13 +13,14 @@ use common::table::{Table, Target, thousands};
 use dimcmc::internals::data::config::{Config, Settings};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::inference::search;
-use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
 use dimcmc::internals::runs::origin::Origin;
+use dimcmc::internals::runs::pool::ranks::{Answering, Ranks as _};
 use dimcmc::internals::runs::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
 use dimcmc::internals::sampling::ensemble::{Sampler, StartDraw, draw_start};
 use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Threads};
 use dimcmc::internals::surface::static_map::Posterior;
 use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
+use dimcmc_mpi::{Queue, Rank, join};
 use std::convert::Infallible;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -107,13 +109,13 @@ fn rank() {
         }
         Rank::Other(worker) => {
             let learn = |brief: &[u8]| {
-                let echo: Answer = Box::new(|question, _| question.to_vec());
+                let echo: Answering = Box::new(|question, _| question.to_vec());
                 match Brief::from_bytes(brief) {
-                    None => Ok::<Answer, Infallible>(echo),
+                    None => Ok::<Answering, Infallible>(echo),
                     Some(_) => Ok(dimcmc::internals::runs::batch::learn(brief).unwrap()),
                 }
             };
-            let Ok(()) = worker.serve(learn);
+            let Ok(()) = worker.answer_all(learn);
         }
     }
 }

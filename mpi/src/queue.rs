@@ -4,6 +4,7 @@ use super::Ranks;
 use super::hands::Hands;
 use super::message::{ANSWER, HELLO, ORDER, Order, numbered, question, split};
 use super::nap::{WHILE_BUSY, WHILE_IDLE, Wait, nap};
+use dimcmc::internals::runs::pool::ranks;
 use mpi::Rank;
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
@@ -35,14 +36,32 @@ impl Queue {
         Queue { ranks, at_once, brief: RefCell::default(), each: Cell::default() }
     }
 
-    /// Number of questions answered at once.
-    pub fn size(&self) -> usize {
+    /// Sends all ranks the brief of the next questions, unless they have it; returns its number.
+    fn tell(&self, brief: &[u8]) -> usize {
+        let (last, number) = &mut *self.brief.borrow_mut();
+        if last != brief {
+            *last = brief.to_vec();
+            *number += 1;
+            self.each.set(None);
+            self.order(Order::Brief(last.len()));
+            self.ranks.world.process_at_rank(0).broadcast_into(&mut last[..]);
+        }
+        *number
+    }
+
+    fn order(&self, order: Order) {
+        for (rank, _) in &self.at_once {
+            self.ranks.world.process_at_rank(*rank).send_with_tag(&order.to_bytes()[..], ORDER);
+        }
+    }
+}
+
+impl ranks::Ranks for Queue {
+    fn size(&self) -> usize {
         self.at_once.iter().map(|(_, at_once)| at_once).sum()
     }
 
-    /// The answers to the first of the `questions` on `brief`: to all, unless `stop` is set meanwhile; after that no
-    /// further question is asked, and pending ones are waited for.
-    pub fn answers(&self, brief: &[u8], questions: &[Vec<u8>], stop: &AtomicBool) -> Vec<Vec<u8>> {
+    fn answers(&self, brief: &[u8], questions: &[Vec<u8>], stop: &AtomicBool) -> Vec<Vec<u8>> {
         let tag = question(self.tell(brief));
         let mut hands = Hands::new(&self.at_once);
         let mut answers: Vec<Option<Vec<u8>>> = vec![None; questions.len()];
@@ -85,25 +104,6 @@ impl Queue {
             }
         }
         answers.into_iter().map_while(|answer| answer).collect()
-    }
-
-    /// Sends all ranks the brief of the next questions, unless they have it; returns its number.
-    fn tell(&self, brief: &[u8]) -> usize {
-        let (last, number) = &mut *self.brief.borrow_mut();
-        if last != brief {
-            *last = brief.to_vec();
-            *number += 1;
-            self.each.set(None);
-            self.order(Order::Brief(last.len()));
-            self.ranks.world.process_at_rank(0).broadcast_into(&mut last[..]);
-        }
-        *number
-    }
-
-    fn order(&self, order: Order) {
-        for (rank, _) in &self.at_once {
-            self.ranks.world.process_at_rank(*rank).send_with_tag(&order.to_bytes()[..], ORDER);
-        }
     }
 }
 

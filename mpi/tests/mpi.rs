@@ -4,10 +4,9 @@
 //! Without a test harness: `mpirun` also starts this program as ranks of jobs that fail on purpose (`ranks`). Without
 //! `mpirun` it prints `skipped`, and fails where `CI` is set.
 
-#[path = "common/desk.rs"]
+#[path = "../../tests/common/desk.rs"]
 #[allow(unused)]
 mod desk;
-#[path = "common/ranks.rs"]
 mod ranks;
 
 use desk::{Desk, says, text, tiny};
@@ -15,6 +14,9 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Output, Stdio};
 use std::time::{Duration, Instant};
+
+/// The program.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dimcmc-mpi");
 
 /// A job that takes longer hangs.
 const LONGEST: Duration = Duration::from_secs(60);
@@ -83,7 +85,7 @@ fn mpirun(desk: &Desk, ranks: usize, program: &str, args: &[&str]) -> Command {
 }
 
 fn on_ranks(desk: &Desk, ranks: usize, args: &[&str]) -> Child {
-    mpirun(desk, ranks, env!("CARGO_BIN_EXE_dimcmc"), args).spawn().unwrap()
+    mpirun(desk, ranks, PROGRAM, args).spawn().unwrap()
 }
 
 /// Waits for the end; a job that hangs fails here.
@@ -253,9 +255,8 @@ fn without_data() {
     desk.write("simulated.json", &self::config().to_string());
     desk.succeed(&["simulate", "simulated.json", "--out", "data"]);
     std::fs::create_dir(desk.path("elsewhere")).unwrap();
-    let program = env!("CARGO_BIN_EXE_dimcmc");
-    let sample = [program, "sample", CONFIG, "--out", "run"];
-    let mut command = mpirun(&desk, 1, program, &sample[1..]);
+    let sample = [PROGRAM, "sample", CONFIG, "--out", "run"];
+    let mut command = mpirun(&desk, 1, PROGRAM, &sample[1..]);
     let job = command.args([":", "-n", "1", "--wdir", desk.path("elsewhere").to_str().unwrap()]).args(sample);
     let output = end(job.spawn().unwrap());
     assert_eq!(output.status.code(), Some(2));

@@ -1,6 +1,7 @@
 //! This program as a rank of a job: fails on purpose, or is queried and timed.
 
-use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
+use dimcmc::internals::runs::pool::ranks::{Answering, Ranks as _, Worker as _};
+use dimcmc_mpi::{Queue, Rank, join};
 use std::convert::Infallible;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
@@ -19,9 +20,9 @@ pub fn play(role: &str, args: &[String]) -> ExitCode {
             let rank = worker.rank();
             let learn = |brief: &[u8]| {
                 let brief = brief[0];
-                Ok::<Answer, Infallible>(Box::new(move |question, _| answer(role, args, rank, brief, question)))
+                Ok::<Answering, Infallible>(Box::new(move |question, _| answer(role, args, rank, brief, question)))
             };
-            let Ok(()) = worker.serve(learn);
+            let Ok(()) = worker.answer_all(learn);
         }
     }
     ExitCode::SUCCESS
