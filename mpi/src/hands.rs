@@ -6,9 +6,11 @@
 //! the fewer are queued (guided self-scheduling, Polychronopoulos & Kuck 1987): at the end of a batch no question is
 //! queued behind another one while a rank is idle.
 
-use mpi::Rank;
 use std::collections::BTreeSet;
 use std::time::Duration;
+
+/// The number of a rank, as MPI has it.
+type Rank = i32;
 
 /// Most rounds queued.
 const MOST_AHEAD: usize = 8;

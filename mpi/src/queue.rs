@@ -1,9 +1,9 @@
 //! Rank 0: questions to free ranks, answers in order.
 
-use super::Ranks;
 use super::hands::Hands;
 use super::message::{ANSWER, HELLO, ORDER, Order, numbered, question, split};
 use super::nap::{WHILE_BUSY, WHILE_IDLE, Wait, nap};
+use super::world::Ranks;
 use dimcmc::internals::runs::pool::ranks;
 use mpi::Rank;
 use mpi::environment::Universe;

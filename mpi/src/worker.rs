@@ -5,7 +5,7 @@
 
 use super::message::{ANSWER, HELLO, ORDER, Order, number, numbered, question, split};
 use super::nap::{WHILE_IDLE, Wait, nap};
-use super::{Ranks, abort, first};
+use super::world::{Ranks, abort, first};
 use dimcmc::internals::runs::pool::TaskError;
 use dimcmc::internals::runs::pool::ranks::{self, Answering, Learn};
 use mpi::environment::Universe;

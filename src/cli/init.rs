@@ -94,7 +94,7 @@ pub struct KnownArgs {
     /// Velocity range to use (km/s, after VRAD); bins outside it, such as bad ends, are ignored
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
     velocity_range: Option<Vec<f64>>,
-    /// Likelihood of an orbit: marginalised over evolving-spot maps, or the static map with the fewest spots
+    /// Likelihood of an orbit: marginalised over evolving-spot maps, or the static map of minimum spot coverage
     #[arg(long, value_name = "NAME", value_parser = ["marginal-likelihood", "spottedness"])]
     objective: Option<String>,
     /// Brightness model of a static map (--objective spottedness): brighter and darker than the photosphere, or spots

@@ -42,7 +42,7 @@ pub struct Args {
     /// Smallest K (km/s); by default a third of the lowest detectable K
     #[arg(long, value_name = "KMS")]
     min_k_kms: Option<f64>,
-    /// Largest K (km/s); by default four times the K detected with certainty at most periods
+    /// Largest K (km/s); by default four times the K that is recovered at all phases for nine of ten periods
     #[arg(long, value_name = "KMS")]
     max_k_kms: Option<f64>,
     /// Number of semi-amplitudes, evenly spaced in their logarithm

@@ -16,8 +16,8 @@ use std::path::PathBuf;
 /// the other objectives the map is static: the one of maximum entropy at `imaging.chi2_target`.
 ///
 /// Writes map.json, profiles.csv (observed and model profiles), rv.csv (RVs before and after removal of the spot
-/// signal) and fit.json (goodness of fit); with light curves (`photometry`) lightcurve.csv,
-/// with activity indicators that count indicators.csv.
+/// signal) and fit.json (goodness of fit); with light curves (`photometry`) lightcurve.csv, and, if activity indicators
+/// enter the fit, indicators.csv.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {

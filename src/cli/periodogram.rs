@@ -43,7 +43,7 @@ pub struct Args {
     /// Marginalise over the free systemic velocity and stellar parameters within their priors: the default
     #[arg(long, alias = "marginalize", conflicts_with = "fixed")]
     marginalise: bool,
-    /// Fix them at the config's values
+    /// Fix systemic velocity and stellar parameters at the config's values
     #[arg(long)]
     fixed: bool,
     /// Number of planet-free Monte Carlo realisations for the FAP

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 /// and the spots by `imaging.spot_amplitude`, `spot_slope`, `spot_lifetime_d` (default values if not given). For an
 /// observed star the section `plan` gives the next nights. Sensitivities follow in closed form, marginalised over
 /// evolving-spot maps; nothing is simulated. Several configs, or several numbers of nights, are compared. --next
-/// chooses the nights that say most of one planet. Writes
-/// plan.json and plan.csv (period, uncertainty of K, K detected with a probability of 50 and 95 %).
+/// chooses the nights that best constrain K of one planet. Writes plan.json and plan.csv (period, uncertainty of K, K
+/// detected with a probability of 50 and 95 %).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc plan configs/demo.json --out runs/demo_plan\n  \
                         dimcmc plan configs/plan.json --nights 8,12,16 --out runs/plan\n  \
@@ -27,7 +27,7 @@ pub struct Args {
     configs: Vec<PathBuf>,
     #[command(flatten)]
     output: Output,
-    /// Numbers of nights per season, one schedule each; of listed cycles, the first nights
+    /// Numbers of nights per season to compare, a schedule for each; of listed cycles the first nights are used
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = nights)]
     nights: Vec<usize>,
     /// Choose this number of the nights: those that most reduce the uncertainty of K of one planet

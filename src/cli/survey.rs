@@ -37,7 +37,7 @@ pub struct Args {
     /// Column of the table: estimate the rate in each group, too
     #[arg(long, value_name = "COLUMN", requires = "table")]
     group: Option<String>,
-    /// Column of the table: probability that the signal of a star is a planet (0 to 1; empty: 1), chance aside
+    /// Column of the table: probability that a star's signal, unless it is noise, is a planet (0 to 1; empty: 1)
     #[arg(long, value_name = "COLUMN", requires = "table")]
     reliability: Option<String>,
     /// Jeffreys prior of each rate, Beta(1/2, 1/2), in place of a uniform one

@@ -23,7 +23,7 @@ pub struct LimitsOptions {
     pub periods: usize,
     /// Smallest K (km/s); by default a third of the lowest detectable K.
     pub min_k_kms: Option<f64>,
-    /// Largest K (km/s); by default four times the K detected with certainty at most periods.
+    /// Largest K (km/s); by default four times the K that is recovered at all phases for nine of ten periods.
     pub max_k_kms: Option<f64>,
     /// Number of semi-amplitudes, 2 or more.
     pub amplitudes: usize,

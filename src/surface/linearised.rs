@@ -7,6 +7,7 @@ use crate::field::FieldError;
 use crate::model::Parameter;
 use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
+use crate::planets::speeds::with_unit;
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::{Remark, decimals};
 use crate::star::observation::RadialVelocity;
@@ -234,10 +235,11 @@ impl SpotField {
     /// One line of text.
     pub fn line(&self) -> String {
         let SpotField { velocity_jitter_kms, ln_evidence, .. } = self;
+        let jitter = with_unit(*velocity_jitter_kms);
         let (amplitude, slope, lifetime) = (self.amplitude(), self.slope(), self.lifetime());
         format!(
             "spots (marginalised): amplitude {amplitude}, power-law index {slope} ({}), \
-            lifetime {lifetime}; RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",
+            lifetime {lifetime}; RV jitter {jitter}; ln Z = {ln_evidence:.1}\n",
             self.spectrum()
         )
     }

@@ -337,7 +337,7 @@ fn a_continuum_at_the_ends_alone_is_recognised() {
         &[
             "observations.continuum_level",
             "note: test fit: evolving maps fit",
-            "as quoted: too little continuum beside the line to measure them by. Give profiles that reach farther, or",
+            "as quoted: too little continuum beside the line to measure the noise. Give profiles of a wider velocity",
         ],
     );
     assert!(!table.contains("unknown"), "{table}");

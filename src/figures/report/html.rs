@@ -96,7 +96,7 @@ pub(super) fn page(page: &Page) -> String {
 /// The rotating star.
 const STAR: &str = "<div class=\"star\">\n<canvas id=\"star\" width=\"260\" height=\"260\" role=\"img\" \
 aria-label=\"The star as it turns, with the spots of the map\"></canvas>\n<p><button id=\"star-play\" \
-type=\"button\">Turn</button> <input id=\"star-time\" type=\"range\" min=\"0\" max=\"1000\" step=\"any\" value=\"0\" \
+type=\"button\">Rotate</button> <input id=\"star-time\" type=\"range\" min=\"0\" max=\"1000\" step=\"any\" value=\"0\" \
 aria-label=\"Time\"></p>\n<p id=\"star-told\"></p>\n\
 <noscript><p>The maps below show the same.</p></noscript>\n</div>\n";
 

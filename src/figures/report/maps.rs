@@ -3,6 +3,7 @@
 use super::chapter::{Chapter, Tone, number, pairs, parameters, tone};
 use crate::data::io::map::FitFile;
 use crate::model::Parameter;
+use crate::planets::speeds::with_unit;
 use crate::sampling::log_density::Status;
 use crate::surface::SpotField;
 use crate::surface::maps::ImageSummary;
@@ -87,7 +88,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         ("power-law index", field.slope() + &caveat("spot_slope")),
         ("turnover degree ℓ_b", number(field.spot_break_degree, 1)),
         ("spot lifetime (d)", lifetime_d + &caveat("spot_lifetime_d")),
-        ("RV jitter (km/s)", number(field.velocity_jitter_kms, 4)),
+        ("RV jitter", with_unit(field.velocity_jitter_kms)),
         ("ln *Z*", number(field.ln_evidence, 2)),
     ]
 }

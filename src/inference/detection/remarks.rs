@@ -6,7 +6,7 @@ use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::nights::NightOffsets;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::posterior_shares;
-use crate::planets::speeds::Speeds;
+use crate::planets::speeds::{Speeds, with_unit};
 use crate::planets::verdict::{CANDIDATE_FAP, LEAST_SHARE, PeriodShare, Remark, UNAMBIGUOUS, Verdict, decimals};
 use crate::surface::imaging::Imager;
 
@@ -88,6 +88,7 @@ impl Detection {
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         remarks.extend(of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
         remarks.extend(night_offsets.and_then(of_night_offsets));
+        remarks.extend(self.of_offsets_in_k());
         if self.highest().on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",
@@ -95,6 +96,20 @@ impl Detection {
             ));
         }
         remarks
+    }
+
+    /// That the uncertainty of K is without the RV offsets of nights that count in the FAP.
+    fn of_offsets_in_k(&self) -> Option<Remark> {
+        let (night_kms, best) = (self.blind.false_alarm.night_kms, self.blind.best().orbit);
+        let sigma_kms = best.k_kms / (2.0 * best.delta_ln_l).sqrt();
+        (self.is_candidate() && night_kms > 0.0).then(|| {
+            Remark::note(format!(
+                "RV offsets of nights of {} count in the FAP, not in K ± σ_K of search and posterior: with them σ_K is \
+                about {}. If the spectrograph's are known, set observations.night_jitter_kms.",
+                with_unit(night_kms),
+                with_unit(sigma_kms)
+            ))
+        })
     }
 
     /// Remarks on the best orbit.

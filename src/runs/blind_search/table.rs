@@ -223,10 +223,10 @@ fn without_nights(nights: &[NightRecord]) -> String {
     };
     let k = |kms: f64| speed(kms, 0.1 * high.abs());
     format!(
-        "Without any one night: K = {} to {}, Δln L ≥ {lowest:.1} (without night {time_d:.2}; {} nights)\n",
+        "Leaving out one of {} nights at a time: K = {} to {}, Δln L ≥ {lowest:.1} (lowest without {time_d:.2})\n",
+        nights.len(),
         k(low),
-        k(high),
-        nights.len()
+        k(high)
     )
 }
 
@@ -237,9 +237,10 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
         kms if kms > 0.0 => format!(" with RV offsets of nights of {:.0} m/s", 1000.0 * kms),
         _ => String::new(),
     };
+    let tail = if used == "draws" { "" } else { ", an extreme-value tail fitted to these" };
     format!(
-        "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations{offsets}, N_ind ≈ {independent_periods:.0})\n\
-        Thresholds at FAP = 10, 1, 0.1 %: {}",
+        "Δln L = {delta_ln_l:.2}, {}; {draws} simulations{offsets}{tail}, N_ind ≈ {independent_periods:.0}\n\
+        Thresholds of Δln L at FAP = 10, 1, 0.1 %: {}",
         false_alarm(*p, *draws),
         levels.join(", ")
     )

@@ -203,6 +203,17 @@ impl LimitsFile {
         )
     }
 
+    /// The period (d) with the highest limit at 95 % of the phases, and that limit.
+    fn worst(&self) -> Option<(f64, String)> {
+        let k95 = |limit: &Limit| limit.k95_kms.unwrap_or(f64::INFINITY);
+        let worst = self.limits.iter().max_by(|a, b| k95(a).total_cmp(&k95(b)))?;
+        let k = match worst.k95_kms {
+            Some(k_kms) => format!("= {}", with_unit(k_kms)),
+            None => format!("> {}", with_unit(*self.k_kms.last()?)),
+        };
+        Some((worst.period_d, k))
+    }
+
     /// A table of some of the periods, and possible problems.
     pub fn table(&self) -> String {
         let unit = self.unit();
@@ -224,6 +235,9 @@ impl LimitsFile {
             100.0 * self.false_alarm_probability,
             self.phases
         );
+        if let Some((period_d, k)) = self.worst() {
+            text += &format!("Highest limit: K 95 % {k} at P = {period_d:.3} d\n");
+        }
         if let Some(orbit) = self.removed {
             let BeforeRecord { false_alarm_probability, draws, .. } = self.before;
             let period_d = orbit.porb_over_prot * self.rotation_period_d();

@@ -241,7 +241,9 @@ impl MeasuredStar {
                 true => format!("Δln Z = {gain:.1}, {NEEDED} needed"),
                 false => format!("Δln Z = {gain:.1}, but the fitted values are too far from their priors"),
             };
-            return format!("values of the config kept, active regions with the photosphere's line ({why})");
+            return format!(
+                "stellar parameters as in the config, active regions with the photosphere's line (a fit: {why})"
+            );
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
             let name = name.trim_end_matches("_kms").replace('_', " ");
