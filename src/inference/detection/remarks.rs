@@ -310,8 +310,8 @@ fn marginal(robustness: &Robustness, nights: &[&WithoutNight], level: f64) -> Op
     Some(Remark::against(
         "FAP > 1 % without single nights",
         format!(
-            "Leaving out any one of {} nights lowers Δln L below the 1 % threshold, {level:.1} (lowest: {lowest:.1}); K \
-            stays {} to {} {}: more nights are needed.",
+            "Leaving out any one of {} nights lowers Δln L below the 1 % threshold, {level:.1} (lowest: {lowest:.1}); \
+            K stays {} to {} {}: more nights are needed.",
             nights.len(),
             unit.cell(Some(low)),
             unit.cell(Some(high)),
