@@ -14,14 +14,13 @@ use dimcmc::internals::data::config::{Config, Settings};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::inference::search;
 use dimcmc::internals::runs::origin::Origin;
-use dimcmc::internals::runs::pool::ranks::{Answering, Ranks as _};
+use dimcmc::internals::runs::pool::ranks::{Answering, Rank, Ranks};
 use dimcmc::internals::runs::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
 use dimcmc::internals::sampling::ensemble::{Sampler, StartDraw, draw_start};
 use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Threads};
 use dimcmc::internals::surface::static_map::Posterior;
 use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
-use dimcmc_mpi::{Queue, Rank, join};
-use std::convert::Infallible;
+use dimcmc_mpi::join;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
@@ -102,20 +101,20 @@ fn rank() {
     match join(1).unwrap() {
         Rank::Only => panic!("started without mpirun"),
         Rank::First(queue) => {
-            workers(&queue);
+            workers(&*queue);
             if queue.size() == 1 {
-                ingredients(&queue);
+                ingredients(&*queue);
             }
         }
         Rank::Other(worker) => {
             let learn = |brief: &[u8]| {
                 let echo: Answering = Box::new(|question, _| question.to_vec());
                 match Brief::from_bytes(brief) {
-                    None => Ok::<Answering, Infallible>(echo),
-                    Some(_) => Ok(dimcmc::internals::runs::batch::learn(brief).unwrap()),
+                    None => Ok(echo),
+                    Some(_) => dimcmc::internals::runs::batch::learn(brief),
                 }
             };
-            let Ok(()) = worker.answer_all(learn);
+            worker.serve(&learn).unwrap();
         }
     }
 }
@@ -148,7 +147,7 @@ impl Case {
 }
 
 /// All workers against one thread, and as many threads, of rank 0, in turn.
-fn workers(queue: &Queue) {
+fn workers(queue: &dyn Ranks) {
     let workers = queue.size();
     let over = format!("workers / 1 thread / {workers} ({EFFICIENCY})");
     let columns = [
@@ -196,7 +195,7 @@ fn workers(queue: &Queue) {
 }
 
 /// The parameters of a simulated cluster.
-fn ingredients(queue: &Queue) {
+fn ingredients(queue: &dyn Ranks) {
     let columns =
         ["free", "pixels", "ms of an evaluation: 5 %", "50 %", "95 %", "largest / mean", "ms of rank 0 for a proposal"];
     let mut table = Table::new("Evaluations of the bulk, and what only rank 0 does", &columns);

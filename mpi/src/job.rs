@@ -3,7 +3,7 @@
 use super::queue::Queue;
 use super::worker::Worker;
 use super::world::abort;
-use dimcmc::internals::runs::pool::ranks;
+use dimcmc::internals::runs::pool::ranks::Rank;
 use mpi::traits::Communicator as _;
 use std::error::Error;
 
@@ -13,19 +13,9 @@ const PANICKED: i32 = 101;
 /// Variables that MPI launchers set for every rank.
 const LAUNCHED: [&str; 5] = ["OMPI_COMM_WORLD_SIZE", "PMI_RANK", "PMIX_RANK", "MPI_LOCALRANKID", "PALS_RANKID"];
 
-/// One process among others.
-pub enum Rank {
-    /// The only one.
-    Only,
-    /// The first, which asks.
-    First(Queue),
-    /// One of the others, which answer.
-    Other(Worker),
-}
-
 /// Why there are no ranks.
 #[derive(Debug, thiserror::Error)]
-pub enum ClusterError {
+enum ClusterError {
     /// MPI does not start, or was started before.
     #[error("MPI does not start")]
     Start,
@@ -38,15 +28,15 @@ pub enum ClusterError {
 /// without a launcher this is the only rank, and MPI is not used.
 ///
 /// # Errors
-/// [`ClusterError`].
-pub fn join(at_once: usize) -> Result<Rank, ClusterError> {
+/// MPI does not start, or does not allow calls from several threads.
+pub fn join(at_once: usize) -> Result<Rank, Box<dyn Error>> {
     if !LAUNCHED.iter().any(|name| std::env::var_os(name).is_some()) {
         return Ok(Rank::Only);
     }
     let threading = mpi::Threading::Multiple;
     let (universe, provided) = mpi::initialize_with_threading(threading).ok_or(ClusterError::Start)?;
     if provided < threading {
-        return Err(ClusterError::Threads);
+        return Err(ClusterError::Threads.into());
     }
     let world = universe.world();
     if world.size() == 1 {
@@ -54,20 +44,8 @@ pub fn join(at_once: usize) -> Result<Rank, ClusterError> {
     }
     abort_on_panic();
     Ok(match world.rank() {
-        0 => Rank::First(Queue::new(universe)),
-        _ => Rank::Other(Worker::new(universe, at_once)),
-    })
-}
-
-/// [`join`] for the commands.
-///
-/// # Errors
-/// [`ClusterError`].
-pub fn rank(at_once: usize) -> Result<ranks::Rank, Box<dyn Error>> {
-    Ok(match join(at_once)? {
-        Rank::Only => ranks::Rank::Only,
-        Rank::First(queue) => ranks::Rank::First(Box::new(queue)),
-        Rank::Other(worker) => ranks::Rank::Other(Box::new(worker)),
+        0 => Rank::First(Box::new(Queue::new(universe))),
+        _ => Rank::Other(Box::new(Worker::new(universe, at_once))),
     })
 }
 

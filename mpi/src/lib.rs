@@ -23,8 +23,4 @@ mod worker;
 mod world;
 
 #[cfg(feature = "mpi")]
-pub use job::{ClusterError, Rank, join, rank};
-#[cfg(feature = "mpi")]
-pub use queue::Queue;
-#[cfg(feature = "mpi")]
-pub use worker::Worker;
+pub use job::join;

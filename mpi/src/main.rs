@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    dimcmc::internals::cli::main(std::env::args_os(), dimcmc_mpi::rank).into()
+    dimcmc::internals::cli::main(std::env::args_os(), dimcmc_mpi::join).into()
 }

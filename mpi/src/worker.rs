@@ -6,12 +6,12 @@
 use super::message::{ANSWER, HELLO, ORDER, Order, number, numbered, question, split};
 use super::nap::{WHILE_IDLE, Wait, nap};
 use super::world::{Ranks, abort, first};
-use dimcmc::internals::runs::pool::TaskError;
 use dimcmc::internals::runs::pool::ranks::{self, Answering, Learn};
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator as _, Destination as _, Root as _, Source as _};
+use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -28,20 +28,6 @@ pub struct Worker {
 impl Worker {
     pub(super) fn new(universe: Universe, at_once: usize) -> Self {
         Worker { ranks: Ranks::new(universe), at_once }
-    }
-
-    /// Answers until dismissed, with the function that `learn` returns for each brief.
-    ///
-    /// # Errors
-    /// The error of `learn`; the other ranks then wait for this one, and must be ended.
-    pub fn answer_all<'a, E>(&self, learn: impl Fn(&[u8]) -> Result<Answering<'a>, E>) -> Result<(), E> {
-        first(&self.ranks.world).send_with_tag(&number(self.at_once)[..], HELLO);
-        let mut brief = self.wait(&AtomicBool::new(false));
-        for number in 1.. {
-            let Some(bytes) = brief else { break };
-            brief = self.answer(&learn(&bytes)?, number);
-        }
-        Ok(())
     }
 
     /// Answers questions on the brief of this number until the next one; `None` when dismissed.
@@ -94,8 +80,14 @@ impl ranks::Worker for Worker {
         self.ranks.world.rank()
     }
 
-    fn serve(&self, learn: Learn) -> Result<(), TaskError> {
-        self.answer_all(learn)
+    fn serve(&self, learn: Learn<'_>) -> Result<(), Box<dyn Error>> {
+        first(&self.ranks.world).send_with_tag(&number(self.at_once)[..], HELLO);
+        let mut brief = self.wait(&AtomicBool::new(false));
+        for number in 1.. {
+            let Some(bytes) = brief else { break };
+            brief = self.answer(&learn(&bytes)?, number);
+        }
+        Ok(())
     }
 
     fn abort(&self, code: i32) {

@@ -58,7 +58,7 @@ pub fn join(global: &Global, join: Join) -> Result<Done, Failure> {
             threads(given.or(Some(1)))?;
             // the first rank decides when to stop; a signal to all must not kill the others
             let _signals = Signals::ignore()?;
-            if let Err(error) = worker.serve(learn) {
+            if let Err(error) = worker.serve(&learn) {
                 console::error(format_args!("rank {}: {error}", worker.rank()));
                 worker.abort(2);
             }

@@ -10,7 +10,7 @@ use crate::planets::verdict::Verdict;
 use crate::runs::fitted::fitted;
 use crate::runs::manifest::{self, Manifest, RunSummary};
 use crate::runs::pool::ranks::Answering;
-use crate::runs::pool::{Answer, Brief, Pool, Question, TaskError, orbit_from_bytes};
+use crate::runs::pool::{Answer, Brief, Pool, Question, orbit_from_bytes};
 use crate::runs::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
 use crate::sampling::chain::ParameterSummary;
 use serde::{Deserialize, Serialize};
@@ -186,7 +186,7 @@ impl Answer for End {
 ///
 /// # Errors
 /// A density that cannot be built there.
-pub fn learn(brief: &[u8]) -> Result<Answering<'static>, TaskError> {
+pub fn learn(brief: &[u8]) -> Result<Answering<'static>, Box<dyn Error>> {
     Ok(match Brief::from_bytes(brief).expect("a rank of this very program asks") {
         Brief::Density(task) => {
             let answer = task.answerer()?;

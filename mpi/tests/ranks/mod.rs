@@ -1,8 +1,7 @@
 //! This program as a rank of a job: fails on purpose, or is queried and timed.
 
-use dimcmc::internals::runs::pool::ranks::{Answering, Ranks as _, Worker as _};
-use dimcmc_mpi::{Queue, Rank, join};
-use std::convert::Infallible;
+use dimcmc::internals::runs::pool::ranks::{Answering, Rank, Ranks};
+use dimcmc_mpi::join;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant, SystemTime};
@@ -15,14 +14,15 @@ pub fn play(role: &str, args: &[String]) -> ExitCode {
     let at_once = if role == "order-and-rest" { 2 } else { 1 };
     match join(at_once).unwrap() {
         Rank::Only => panic!("started without mpirun"),
-        Rank::First(queue) => first(role, args, &queue),
+        Rank::First(queue) => first(role, args, &*queue),
         Rank::Other(worker) => {
             let rank = worker.rank();
             let learn = |brief: &[u8]| {
                 let brief = brief[0];
-                Ok::<Answering, Infallible>(Box::new(move |question, _| answer(role, args, rank, brief, question)))
+                let answering: Answering = Box::new(move |question, _| answer(role, args, rank, brief, question));
+                Ok(answering)
             };
-            let Ok(()) = worker.answer_all(learn);
+            worker.serve(&learn).unwrap();
         }
     }
     ExitCode::SUCCESS
@@ -33,7 +33,7 @@ pub fn now_s() -> f64 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs_f64()
 }
 
-fn first(role: &str, args: &[String], queue: &Queue) {
+fn first(role: &str, args: &[String], queue: &dyn Ranks) {
     if role == "many-briefs" {
         return many_briefs(queue);
     }
@@ -49,7 +49,7 @@ fn first(role: &str, args: &[String], queue: &Queue) {
 }
 
 /// More briefs than there are tags, each answered by itself.
-fn many_briefs(queue: &Queue) {
+fn many_briefs(queue: &dyn Ranks) {
     let questions: Vec<Vec<u8>> = (0..5).map(|k| vec![k]).collect();
     let right = (0..1100_u16).filter(|k| {
         let brief = (k % 100) as u8;

@@ -1,6 +1,6 @@
 //! The other processes of a job, as the commands see them. `mpi/` has them by MPI.
 
-use super::TaskError;
+use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -11,7 +11,7 @@ pub type Answering<'a> = Box<dyn Fn(&[u8], &Arc<AtomicBool>) -> Vec<u8> + Sync +
 ///
 /// # Errors
 /// A density that cannot be built there.
-pub type Learn = fn(&[u8]) -> Result<Answering<'static>, TaskError>;
+pub type Learn<'a> = &'a dyn Fn(&[u8]) -> Result<Answering<'a>, Box<dyn Error>>;
 
 /// This process among those of its job.
 pub enum Rank {
@@ -38,11 +38,11 @@ pub trait Worker {
     /// The number of this rank, for messages.
     fn rank(&self) -> i32;
 
-    /// Answers until dismissed.
+    /// Answers until dismissed, with the function that `learn` returns for each brief.
     ///
     /// # Errors
     /// That of `learn`; the other ranks then wait for this one, and must be ended.
-    fn serve(&self, learn: Learn) -> Result<(), TaskError>;
+    fn serve(&self, learn: Learn<'_>) -> Result<(), Box<dyn Error>>;
 
     /// Ends all processes of the job at once, with this exit code.
     fn abort(&self, code: i32);

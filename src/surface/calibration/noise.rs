@@ -105,7 +105,7 @@ impl NoiseError {
 
 /// What is missing where uncertainties are not measured, and how to give it.
 pub const NO_CONTINUUM: &str = "too little continuum beside the line to measure the noise. Give profiles of a \
-     wider velocity range, or their factor, observations.sigma_scale";
+     wider velocity range, or the factor of the quoted uncertainties (observations.sigma_scale)";
 
 /// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: the uncertainties are
 /// accurate to 13 and 22 %.
