@@ -81,8 +81,6 @@ fn mpirun(desk: &Desk, ranks: usize, program: &str, args: &[&str]) -> Command {
     command.args(args).current_dir(desk.path("")).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Open MPI's launcher sleeps for a second between SIGTERM and SIGKILL, sometimes even with no process left to kill
     command.env("OMPI_MCA_odls_base_sigkill_timeout", "0").env("DIMCMC_CACHE", "off");
-    // two jobs of two ranks beside each other have threads enough
-    command.env("RAYON_NUM_THREADS", "1");
     command
 }
 

@@ -143,9 +143,9 @@ impl Rows {
     #[inline(always)]
     pub fn interleave(&mut self, nodes: &[f64]) {
         for (row, values) in self.values.chunks_exact_mut(self.stride).enumerate() {
-            for (value, node) in
-                values[self.margin..].iter_mut().zip(nodes[row.min(nodes.len())..].iter().step_by(self.steps_per_bin))
-            {
+            let mut nodes = nodes[row.min(nodes.len())..].iter().step_by(self.steps_per_bin);
+            for value in &mut values[self.margin..] {
+                let Some(node) = nodes.next() else { break };
                 *value = *node;
             }
         }
@@ -155,8 +155,9 @@ impl Rows {
     #[inline(always)]
     pub fn deinterleave(&self, nodes: &mut [f64]) {
         for row in 0..self.steps_per_bin.min(nodes.len()) {
-            let targets = nodes[row..].iter_mut().step_by(self.steps_per_bin);
-            for (value, node) in self.row(row)[self.margin..].iter().zip(targets) {
+            let mut targets = nodes[row..].iter_mut().step_by(self.steps_per_bin);
+            for value in &self.row(row)[self.margin..] {
+                let Some(node) = targets.next() else { break };
                 *node = *value;
             }
         }

@@ -9,9 +9,11 @@ pub const CHUNK: usize = 32;
 #[inline(always)]
 pub fn correlate(i: impl Instructions, taps: &[f64], source: &[f64], sums: &mut [f64; CHUNK]) {
     assert!(source.len() + 1 >= taps.len() + CHUNK);
-    for (tap, window) in taps.iter().zip(source.windows(CHUNK)) {
-        for (sum, x) in sums.iter_mut().zip(window) {
-            *sum = i.multiply_add(*tap, *x, *sum);
+    let mut windows = source.windows(CHUNK);
+    for tap in taps {
+        let Some(window) = windows.next() else { break };
+        for j in 0..CHUNK {
+            sums[j] = i.multiply_add(*tap, window[j], sums[j]);
         }
     }
 }

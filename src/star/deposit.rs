@@ -161,9 +161,10 @@ impl Deposit {
                 unsafe { kernel::gather(N::registers(i), group, x, left) };
             }
             for two in left.chunks_exact(2 * self.nodes) {
-                let (a, b) = two.split_at(self.nodes);
-                let both = a.iter().zip(b).map(|(a, b)| weight * ((*a).into() + (*b).into()));
-                nodes.iter_mut().zip(both).for_each(|(node, both)| *node += both);
+                let (a, b) = (&two[..nodes.len()], &two[self.nodes..][..nodes.len()]);
+                for (n, node) in nodes.iter_mut().enumerate() {
+                    *node += weight * (a[n].into() + b[n].into());
+                }
             }
         }
     }

@@ -30,13 +30,14 @@ pub unsafe fn gather<R: Scattered>(
     x: &[R::Number],
     left: &mut [R::Number],
 ) {
-    let grid = left.len() / DEPOSIT_NODES;
+    let (grid, pixels) = (left.len() / DEPOSIT_NODES, &pixels[..blocks.len()]);
     // lanes without a pixel may repeat a cell: they come last, and of two stores to one place the first wins
     let (one_cell, mut totals) = (cells[0] == cells[1], [0.0; DEPOSIT_NODES]);
     for first in (0..LANES).step_by(R::LANES).rev() {
         let mut sums = [r.splat(R::Number::default()); DEPOSIT_NODES];
         let mut spread_sums = [r.splat(R::Number::default()); SPREAD_FACTORS.len()];
-        for (block, pixels) in blocks.iter().zip(pixels) {
+        for (n, block) in blocks.iter().enumerate() {
+            let pixels = &pixels[n];
             if first == 0 {
                 vector::fetch_ahead(block, AHEAD);
                 vector::fetch_ahead(pixels, AHEAD);
@@ -49,16 +50,16 @@ pub unsafe fn gather<R: Scattered>(
             let term = r.multiply(x, r.load(&block.weight, first));
             let times_t = r.multiply(term, t);
             let terms = [term, times_t, r.multiply(term, squared), r.multiply(times_t, squared)];
-            for (k, term) in terms.into_iter().enumerate() {
-                sums[k] = r.add(sums[k], term);
-                spread_sums[k] = r.multiply_add(term, spread, spread_sums[k]);
+            for k in 0..terms.len() {
+                sums[k] = r.add(sums[k], terms[k]);
+                spread_sums[k] = r.multiply_add(terms[k], spread, spread_sums[k]);
             }
             for k in terms.len()..DEPOSIT_NODES {
                 sums[k] = r.multiply_add(terms[k - 2], squared, sums[k]);
             }
         }
-        for ((sum, spread_sum), factor) in sums[2..].iter_mut().zip(spread_sums).zip(SPREAD_FACTORS) {
-            *sum = r.multiply_add(r.splat(R::Number::of(factor)), spread_sum, *sum);
+        for k in 0..SPREAD_FACTORS.len() {
+            sums[k + 2] = r.multiply_add(r.splat(R::Number::of(SPREAD_FACTORS[k])), spread_sums[k], sums[k + 2]);
         }
         // nodes that mirror each other have the same weights except for the sign of odd powers
         let mut nodes = sums;
@@ -67,12 +68,12 @@ pub unsafe fn gather<R: Scattered>(
             nodes[n] = r.add(even, odd);
             nodes[DEPOSIT_NODES - 1 - n] = r.subtract(even, odd);
         }
-        for (n, node) in nodes.into_iter().enumerate() {
+        for n in 0..DEPOSIT_NODES {
             if one_cell {
-                totals[n] += r.total(node);
+                totals[n] += r.total(nodes[n]);
             } else {
                 // safe: the caller guarantees the cells
-                unsafe { r.put(node, &mut left[n * (grid + 1)..], cells, first) };
+                unsafe { r.put(nodes[n], &mut left[n * (grid + 1)..], cells, first) };
             }
         }
     }
@@ -96,23 +97,25 @@ pub unsafe fn scatter<R: Scattered>(
     nodes: &[R::Number],
     out: &mut [R::Number],
 ) {
+    let pixels = &pixels[..blocks.len()];
     for first in (0..LANES).step_by(R::LANES) {
         let mut of_cells = [r.splat(R::Number::default()); DEPOSIT_NODES];
-        for (n, node) in of_cells.iter_mut().enumerate() {
+        for n in 0..DEPOSIT_NODES {
             // safe: the caller guarantees the cells
-            *node = unsafe { r.pick(&nodes[n..], cells, first) };
+            of_cells[n] = unsafe { r.pick(&nodes[n..], cells, first) };
         }
         let mut coefficients = [r.splat(R::Number::default()); DEPOSIT_NODES];
         for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
             let (node, mirrored) = (of_cells[n], of_cells[DEPOSIT_NODES - 1 - n]);
             let both = [r.add(node, mirrored), r.subtract(node, mirrored)];
-            for (k, coefficient) in coefficients.iter_mut().enumerate() {
-                *coefficient = r.multiply_add(r.splat(R::Number::of(weights[k])), both[k % 2], *coefficient);
+            for k in 0..DEPOSIT_NODES {
+                coefficients[k] = r.multiply_add(r.splat(R::Number::of(weights[k])), both[k % 2], coefficients[k]);
             }
         }
         let of_spread: [R::Lanes; SPREAD_FACTORS.len()] =
             std::array::from_fn(|k| r.multiply(r.splat(R::Number::of(SPREAD_FACTORS[k])), coefficients[k + 2]));
-        for (block, pixels) in blocks.iter().zip(pixels) {
+        for (n, block) in blocks.iter().enumerate() {
+            let pixels = &pixels[n];
             if first == 0 {
                 vector::fetch_ahead(block, AHEAD);
                 vector::fetch_ahead(pixels, AHEAD);

@@ -285,8 +285,9 @@ impl<'a, N: Number> Pass<'a, N> {
         }
         let sums = [(&mut *nodes, mixture.own), (&mut *of_regions, mixture.region)];
         for (nodes, [factor, limb_factor]) in sums {
-            for (node, (all, limb)) in nodes.iter_mut().zip(deposited[0].iter().zip(&deposited[1])) {
-                *node = factor * all + limb_factor * limb;
+            let [all, limb] = [&deposited[0][..nodes.len()], &deposited[1][..nodes.len()]];
+            for (n, node) in nodes.iter_mut().enumerate() {
+                *node = factor * all[n] + limb_factor * limb[n];
             }
         }
         rows[0].interleave(nodes);
@@ -316,8 +317,9 @@ impl<'a, N: Number> Pass<'a, N> {
         for (which, deposit) in [Some(deposit), limb.as_ref()].into_iter().enumerate() {
             let Some(deposit) = deposit else { continue };
             let (own, region) = (mixture.own[which], mixture.region[which]);
-            for (of_cell, (node, of_regions)) in of_cells.iter_mut().zip(nodes.iter().zip(&*of_regions)) {
-                *of_cell = N::of(own * (node + continuum) + region * (of_regions + continuum));
+            let (nodes, of_regions) = (&nodes[..of_cells.len()], &of_regions[..of_cells.len()]);
+            for (n, of_cell) in of_cells.iter_mut().enumerate() {
+                *of_cell = N::of(own * (nodes[n] + continuum) + region * (of_regions[n] + continuum));
             }
             deposit.scatter(i, k, of_cells, out);
         }

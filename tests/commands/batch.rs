@@ -115,7 +115,6 @@ fn start(desk: &Desk, name: &str, args: &[&str], variables: &[(&str, &str)]) -> 
     let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap());
     let mut bash = Command::new("bash");
     bash.arg(script(name)).args(args).current_dir(desk.path("")).env("PATH", path).env("DIMCMC", "dimcmc");
-    bash.env("RAYON_NUM_THREADS", "1");
     bash.envs(variables.iter().copied()).stdout(Stdio::piped()).stderr(Stdio::piped());
     bash.spawn().unwrap()
 }

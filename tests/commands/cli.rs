@@ -59,7 +59,7 @@ fn simulated_files_give_the_map_of_the_simulation() {
     assert_eq!((&truth["snr"], &truth["seed"]), (&json!(500.0), &json!(7)));
 
     let table = desk.succeed(&["map", "config.json", "--out", "a"]);
-    desk.succeed(&["map", "simulated.json", "--out", "b", "--threads", "2", "--quiet"]);
+    desk.succeed(&["map", "simulated.json", "--out", "b", "--threads", "1", "--quiet"]);
     says(&table, &["chi2", "spottedness", "RV filtered", "a: map.json, profiles.csv, rv.csv, fit.json"]);
     let (a, b) = (desk.json("a/map.json"), desk.json("b/map.json"));
     for key in ["longitude_deg", "latitude_deg", "area_fraction", "spot_filling"] {

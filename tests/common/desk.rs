@@ -66,11 +66,10 @@ pub fn copy(from: &Path, to: &Path) {
 /// Folder of its cached fits to profiles, for the next test.
 pub const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/fitted");
 
-/// The program, ready for arguments, with one thread unless they ask for more: tests run beside each other, and two
-/// programs with two threads each need a fourth more time of two processors.
+/// The program, ready for arguments.
 pub fn program() -> Command {
     let mut command = Command::new(PROGRAM);
-    command.env("DIMCMC_CACHE", CACHE).env("RAYON_NUM_THREADS", "1");
+    command.env("DIMCMC_CACHE", CACHE);
     command
 }
 

@@ -93,7 +93,8 @@ pub fn short_dot(i: impl Instructions, a: &[f64], b: &[f64]) -> f64 {
 fn in_parts<N: Number, const PARTS: usize>(i: impl Instructions, a: &[N], b: &[N]) -> f64 {
     let mut sums = [N::default(); PARTS];
     let ((a, rest_a), (b, rest_b)) = (a.as_chunks::<PARTS>(), b.as_chunks::<PARTS>());
-    for (a, b) in a.iter().zip(b) {
+    for (n, a) in a.iter().enumerate() {
+        let b = &b[n];
         for k in 0..PARTS {
             sums[k] = N::multiply_add(i, a[k], b[k], sums[k]);
         }
@@ -182,7 +183,10 @@ impl<N: Number, M: Number, F: Fn(N, M) -> N> Task for Combine<'_, N, M, F> {
 
     #[inline(always)]
     fn run<I: Instructions>(self, _: I) {
-        self.y.iter_mut().zip(self.x).for_each(|(y, x)| *y = (self.f)(*y, *x));
+        let x = &self.x[..self.y.len()];
+        for (n, y) in self.y.iter_mut().enumerate() {
+            *y = (self.f)(*y, x[n]);
+        }
     }
 }
 
@@ -198,8 +202,10 @@ impl<N: Number, M: Number, F: Fn(N, M, M) -> N> Task for CombineTwo<'_, N, M, F>
 
     #[inline(always)]
     fn run<I: Instructions>(self, _: I) {
-        let others = self.x.iter().zip(self.y);
-        self.z.iter_mut().zip(others).for_each(|(z, (x, y))| *z = (self.f)(*z, *x, *y));
+        let (x, y) = (&self.x[..self.z.len()], &self.y[..self.z.len()]);
+        for (n, z) in self.z.iter_mut().enumerate() {
+            *z = (self.f)(*z, x[n], y[n]);
+        }
     }
 }
 

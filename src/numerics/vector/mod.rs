@@ -18,7 +18,8 @@ pub trait Task {
     /// What it returns.
     type Output;
 
-    /// Does it; to be marked `#[inline(always)]`.
+    /// Does it; to be marked `#[inline(always)]`. Its loops take numbers or one iterator each: pairs (`zip`) and arrays
+    /// by value are calls in a build of several codegen units, and `init` takes a third longer.
     fn run<I: Instructions>(self, instructions: I) -> Self::Output;
 }
 
