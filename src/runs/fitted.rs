@@ -1,10 +1,11 @@
 //! The fit of star, events and rotation period to the profiles ([`Scene::fitted`]), cached between commands: `map`,
 //! `periodogram`, `limits` and `sample` of one config begin with the same fit, which takes longer than a map.
 //!
-//! It is a file in the user's cache, whose name is a fingerprint of config, observations, program and kind of
-//! processor: results of another program or of other data are never used. Only computing time depends on it: a cache
-//! that cannot be read or written is no error.
+//! It is a file in the user's cache, whose name is a fingerprint of config (but for sampler and priors of orbits),
+//! observations, program and kind of processor: results of another program or of other data are never used. Only
+//! computing time depends on it: a cache that cannot be read or written is no error.
 
+use crate::data::config::fit_fingerprint;
 use crate::data::io::atomic::write_json;
 use crate::data::io::provenance::Measured;
 use crate::data::scene::Scene;
@@ -61,7 +62,9 @@ fn name(scene: &Scene) -> Option<String> {
     hash.update(program.len().to_le_bytes());
     hash.update(built.as_nanos().to_le_bytes());
     hash.update([u8::from(vector::is_fused())]);
-    hash.update(&scene.settings.sha256);
+    hash.update(fit_fingerprint(&scene.settings.resolved));
+    // with orbits: their priors may be where values come from
+    hash.update(format!("{:?}", scene.settings.values));
     hash.update(&scene.data_sha256);
     Some(format!("{:x}.json", hash.finalize()))
 }

@@ -82,6 +82,14 @@ fn what_is_fitted_is_kept_for_the_next_command() {
     std::fs::write(file, measured.to_string()).unwrap();
     map("cache", "second");
     assert_eq!(desk.json("second/fit.json")["measured"]["star"]["gain"], 3.25);
+    // sampler and priors of orbits do not count
+    let mut other = config.clone();
+    other["sampler"]["seed"] = json!(99);
+    other["parameters"]["k_kms"] = json!({ "prior": "uniform", "min": 0.0, "max": 0.7 });
+    desk.write(CONFIG, &other.to_string());
+    map("cache", "second");
+    assert_eq!(desk.json("second/fit.json")["measured"]["star"]["gain"], 3.25);
+    desk.write(CONFIG, &config.to_string());
     std::fs::write(file, &whole[..whole.len() / 2]).unwrap();
     assert_eq!(map("cache", "second"), by_itself);
     assert_eq!(std::fs::read_to_string(file).unwrap(), whole);

@@ -9,8 +9,26 @@ use sha2::{Digest, Sha256};
 /// of star and spectrograph, the star's mass (with one planet), and the sampler's `steps`, `rhat` and `ess`.
 /// Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
+    sha256(&decisive(resolved))
+}
+
+/// SHA-256 (hex) of the part of a resolved config that decides what is fitted to the profiles before maps and searches:
+/// neither sampler nor priors of orbits.
+pub fn fit_fingerprint(resolved: &Value) -> String {
+    let mut value = decisive(resolved);
+    if let Some(top) = value.as_object_mut() {
+        top.remove("sampler");
+    }
+    if let Some(free) = value.get_mut("parameters").and_then(Value::as_object_mut) {
+        let orbits = Elements::PLANETS.iter().flat_map(Elements::all);
+        orbits.for_each(|parameter| drop(free.remove(parameter.name())));
+    }
+    sha256(&value)
+}
+
+fn sha256(value: &Value) -> String {
     let mut text = String::new();
-    canonical(&decisive(resolved), &mut text);
+    canonical(value, &mut text);
     format!("{:x}", Sha256::digest(text))
 }
 

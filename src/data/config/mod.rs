@@ -18,7 +18,7 @@ pub use crate::sampling::ensemble::SamplerSettings;
 pub use document::{Config, from_json, to_text};
 pub use draft::{Beside, Draft, Sought};
 pub use error::ConfigError;
-pub use identity::{Difference, first_difference, jitter_difference, section_difference};
+pub use identity::{Difference, first_difference, fit_fingerprint, jitter_difference, section_difference};
 pub use instruments::{SPECTROGRAPHS, Spectrograph};
 pub use settings::{
     DataSetSettings, FITTED, GridSettings, IndicatorSettings, LightCurveSettings, LightSource, MOST_NODES,
