@@ -3,11 +3,16 @@
 use super::chapter::{Table, table};
 use crate::figures::plot::symbols::label;
 use crate::model::Parameter;
+use crate::planets::periodogram::most_offset_kms;
+use crate::planets::speeds::with_unit;
+use crate::surface::calibration::star::mean_and_sd;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
+const NIGHTS: &str = "/observations/night_jitter_kms";
+
 /// Keys of a config with their names and units.
-const KEYS: [(&str, &str, &str); 25] = [
+const KEYS: [(&str, &str, &str); 26] = [
     ("/star/rotation_period_d", "rotation period", "d"),
     ("/star/epoch_d", "epoch of rotation phase 0", "d"),
     ("/star/inclination_deg", "inclination", "°"),
@@ -28,6 +33,7 @@ const KEYS: [(&str, &str, &str); 25] = [
     ("/instrument/resolving_power", "resolving power", ""),
     ("/observations/sigma_scale", "scale of the uncertainties", ""),
     ("/observations/velocity_jitter_kms", "RV jitter", "km/s"),
+    (NIGHTS, "RV offsets of nights", "km/s"),
     ("/imaging/objective", "surface model", ""),
     ("/imaging/brightness", "pixels hold", ""),
     ("/imaging/pixels", "pixels", ""),
@@ -38,15 +44,24 @@ const KEYS: [(&str, &str, &str); 25] = [
 /// Keys that only static maps use.
 const STATIC: [&str; 1] = ["/imaging/chi2_target"];
 
-/// Values that are held fixed.
+fn is_evolving(config: &Value) -> bool {
+    config.pointer("/imaging/objective").and_then(Value::as_str) == Some("marginal-likelihood")
+}
+
+/// Values of the config: those that are held fixed, and the defaults that decide on planets.
 pub(super) fn fixed(config: &Value) -> Table {
     let is_free = |pointer: &str| {
         let key = pointer.rsplit('/').next().unwrap_or_default();
         config.pointer(&format!("/parameters/{key}")).is_some()
     };
-    let evolves = config.pointer("/imaging/objective").and_then(Value::as_str) == Some("marginal-likelihood");
+    let evolves = is_evolving(config);
     let row = |(pointer, name, unit): &(&str, &str, &str)| {
         let is_idle = evolves && STATIC.contains(pointer);
+        if *pointer == NIGHTS && evolves && config.pointer(pointer).is_none_or(Value::is_null) {
+            let stability_kms = config.pointer("/instrument/stability_ms").and_then(Value::as_f64).map(|x| x / 1e3);
+            let most = with_unit(most_offset_kms(stability_kms));
+            return Some(vec![(*name).to_owned(), format!("up to {most} in the FAP; none in K and its uncertainty")]);
+        }
         let value = config.pointer(pointer).filter(|value| !value.is_null() && !is_free(pointer) && !is_idle)?;
         let unit = if unit.is_empty() || !value.is_number() { String::new() } else { format!(" {unit}") };
         Some(vec![(*name).to_owned(), format!("{}{}", written(value), unit.replace(" °", "°"))])
@@ -77,6 +92,30 @@ pub(super) fn priors(config: &Value) -> Table {
         .collect();
     rows.sort();
     table(&["parameter", "prior", "range"], rows.into_iter().map(|(_, row)| row).collect())
+}
+
+/// Normal priors of the line and of active regions, where they are fitted before maps and searches.
+pub(super) fn fitted(config: &Value) -> Table {
+    let at = |key: &str| config.pointer(&format!("/{}", key.replace('.', "/"))).filter(|value| !value.is_null());
+    let named = at("star.fitted").and_then(Value::as_array).into_iter().flatten();
+    let of_line = named.filter_map(|name| Parameter::from_name(name.as_str()?));
+    let of_regions = Parameter::REGIONS.into_iter().filter(|region| at(region.spec().config_key).is_none());
+    let of_regions = of_regions.filter(|_| is_evolving(config));
+    let row = |parameter: Parameter| {
+        let value = match at(parameter.spec().config_key) {
+            Some(Value::Array(list)) => list.first().and_then(Value::as_f64),
+            Some(value) => value.as_f64(),
+            None => parameter.spec().usual,
+        };
+        let unit = parameter.spec().unit.trim_start_matches('1');
+        let prior = match (value, mean_and_sd(parameter, value.unwrap_or(1.0))) {
+            (Some(_), (mean, sd)) => format!("{mean:.2} ± {sd:.2} {unit}"),
+            (None, (_, sd)) => format!("value from the mean profile ± {:.0} %", 100.0 * sd),
+        };
+        let meaning = parameter.spec().about.split([':', '.']).next().unwrap_or_default();
+        vec![label(parameter.name()), meaning.to_owned(), prior.trim_end().to_owned()]
+    };
+    table(&["parameter", "meaning", "normal prior"], of_line.chain(of_regions).map(row).collect())
 }
 
 /// Keys in which the configs of several folders differ: key, and its value in each.
@@ -158,6 +197,25 @@ mod tests {
         assert!(!fixed.iter().any(|row| row[0].contains("sin") || row[0].contains("target")), "{fixed:?}");
         let priors = priors(&config).rows;
         assert_eq!(priors.iter().map(|row| row[1..].join(" ")).collect::<Vec<_>>(), ["periodic ", "uniform 20 to 40"]);
+    }
+
+    #[test]
+    fn priors_of_the_line_and_offsets_of_nights_are_told() {
+        let mut config = json!({
+            "star": { "line": { "sigma_kms": 3.6, "equivalent_width_kms": "auto" }, "regions": { "area": 0.0 },
+                "fitted": ["line_sigma_kms", "equivalent_width_kms"] },
+            "imaging": { "objective": "marginal-likelihood" }
+        });
+        let rows = fitted(&config).rows;
+        assert_eq!([&rows[0][2], &rows[1][2]], ["3.60 ± 1.44 km/s", "value from the mean profile ± 15 %"]);
+        assert_eq!(rows.len(), 2 + Parameter::REGIONS.len() - 1, "{rows:?}");
+        let nights = |config: &Value| fixed(config).rows.into_iter().find(|row| row[0].contains("nights"));
+        assert!(nights(&config).unwrap()[1].starts_with("up to 60 m/s in the FAP"));
+        config["observations"] = json!({ "night_jitter_kms": 0.0 });
+        assert_eq!(nights(&config).unwrap()[1], "0 km/s");
+        config["imaging"]["objective"] = json!("spottedness");
+        config["observations"] = Value::Null;
+        assert!(nights(&config).is_none() && fitted(&config).rows.len() == 2);
     }
 
     #[test]

@@ -126,6 +126,7 @@ fn page(parts: Vec<Part>, turning: Option<Value>) -> Page {
     if let Some(config) = &config {
         assumed.push(("Values of the config.".into(), assumed::fixed(config)));
         assumed.push(("Priors of the free parameters.".into(), assumed::priors(config)));
+        assumed.push(("Priors of what is fitted before map and search.".into(), assumed::fitted(config)));
         assumed.push((
             "The folders have different configs; the tables above are of the first.".into(),
             assumed::differences(&configs),

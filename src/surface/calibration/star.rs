@@ -30,6 +30,12 @@ const OF_STRENGTH: f64 = 0.15;
 const OF_VSINI: (f64, f64) = (0.04, 1.0);
 const OF_LIMB_DARKENING: f64 = 0.15;
 
+/// Mean and standard deviation of the normal prior of a fitted stellar parameter that is `value` in the config.
+pub fn mean_and_sd(parameter: Parameter, value: f64) -> (f64, f64) {
+    let prior = prior(parameter, value);
+    (prior.mean, prior.sd)
+}
+
 /// The prior of a stellar parameter that is `value` in the config.
 fn prior(parameter: Parameter, value: f64) -> StarPrior {
     let (low, high) = parameter.widest();
