@@ -21,6 +21,8 @@ pub struct Args {
     runs: Vec<PathBuf>,
     #[command(flatten)]
     output: Output,
+    #[command(flatten)]
+    shown: analyse::Shown,
 }
 
 /// Runs the command.
@@ -36,7 +38,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     signals.defer();
     let folder = args.output.create()?;
     merged.write(&folder, args.output.replaces()).map_err(failure)?;
-    analyse::report(&folder, &merged.manifest, &merged.chain)?;
+    analyse::report(&folder, &merged.manifest, &merged.chain, args.shown)?;
     for (run, beyond) in args.runs.iter().zip(&merged.beyond).filter(|(_, beyond)| **beyond > 0) {
         let shortest = merged.chain.steps() - 1;
         console::line(format_args!(

@@ -40,6 +40,8 @@ pub struct Args {
     /// Seed, in place of sampler.seed: for runs of one config to be merged
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    #[command(flatten)]
+    shown: analyse::Shown,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -117,7 +119,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         }
         StopReason::Converged | StopReason::StepLimit => {
             noted.map_err(failed)?;
-            analyse::report(folder, &run.manifest, &run.chain)
+            analyse::report(folder, &run.manifest, &run.chain, args.shown)
         }
     }
 }

@@ -60,7 +60,10 @@ fn the_number_of_threads_does_not_show() {
     let [one, two] = [("1", "a"), ("2", "b")]
         .map(|(threads, out)| desk.succeed(&["sample", CONFIG, "--out", out, "--threads", threads]));
     assert_eq!(one, two);
-    says(&one, &["truth", "k_kms", "phi", "60 steps", "acceptance", "Not converged", "--extend"]);
+    says(&one, &["truth", "k_kms", "phi", "60 steps", "evaluations", "Not converged", "--extend"]);
+    let verbose = desk.succeed(&["analyse", "a", "--verbose"]);
+    assert!(verbose.starts_with(&one), "{verbose}");
+    says(&verbose[one.len()..], &["acceptance 0.", "model applications", "highest ln posterior", "stretch"]);
     same_run(&desk, "a", "b");
     assert_eq!(lines(&desk, "a"), LINES * (STEPS + 1));
     let summary = desk.json("a/summary.json");

@@ -4,7 +4,7 @@ use super::{CHAIN, RunError, SUMMARY, read_chain};
 use crate::data::io::atomic::write_json;
 use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
 use crate::sampling::chain::statistics::unwrap_around;
-use crate::sampling::chain::{Chain, ParameterKind, Settled};
+use crate::sampling::chain::{Chain, ParameterKind, Settled, table};
 use std::path::Path;
 
 /// Summary and text.
@@ -14,6 +14,8 @@ pub struct Conclusion {
     pub summary: RunSummary,
     /// The verdict, the table of the parameters, and notes: the output of `dimcmc analyse`.
     pub text: String,
+    /// How the sampler went: what `--verbose` adds.
+    pub diagnostics: String,
     kinds: Vec<ParameterKind>,
     settled: Vec<Settled>,
 }
@@ -43,7 +45,8 @@ impl Conclusion {
         let mut text = summary.table(manifest.truth(&settings, &summary).as_ref()).trim_end().to_owned();
         let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
         notes.for_each(|note| text += &format!("\nnote: {note}"));
-        Ok(Conclusion { summary, text, kinds, settled })
+        let diagnostics = table::diagnostics(&summary).trim_end().to_owned();
+        Ok(Conclusion { summary, text, diagnostics, kinds, settled })
     }
 
     /// The draws of every parameter and of every derived quantity, by name: those of `chain`, the chain of this

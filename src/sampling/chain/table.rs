@@ -35,7 +35,7 @@ pub fn parameters(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> S
     text
 }
 
-/// The part after the parameters: limits, derived quantities, and statistics of the chain.
+/// The part after the parameters: limits, derived quantities, and convergence.
 pub fn rest(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
     let mut text = String::new();
     for name in &summary.names {
@@ -43,19 +43,15 @@ pub fn rest(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String 
             text += &format!("{name} is consistent with zero: < {} (95 % upper limit)\n", number(upper, decimals(one)));
         }
     }
-    text += &derived(summary, truth);
-    text += &format!(
-        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} model applications each, best \
-        log_prob {:.3}\n",
-        summary.steps,
-        summary.discarded_steps,
-        summary.acceptance_fraction,
-        summary.evaluations,
-        summary.failures,
-        summary.model_applications_median,
-        summary.best.log_prob
-    );
-    text + &moves(summary) + &convergence(summary) + "\n"
+    text + &derived(summary, truth) + &convergence(summary) + "\n"
+}
+
+/// How the sampler went: acceptance, cost of an evaluation, and each move.
+pub fn diagnostics(summary: &Summary) -> String {
+    format!(
+        "acceptance {:.2}, {:.0} model applications per evaluation, highest ln posterior {:.3}\n",
+        summary.acceptance_fraction, summary.model_applications_median, summary.best.log_prob
+    ) + &moves(summary)
 }
 
 /// Derived quantities and descriptions of names; `truth` contains them as well.
@@ -99,13 +95,18 @@ fn moves(summary: &Summary) -> String {
     format!("{} effective samples per evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))
 }
 
+/// A line on the length of the chain, and a last one on what it is good for.
 fn convergence(summary: &Summary) -> String {
+    let Summary { steps, discarded_steps, evaluations, failures, .. } = summary;
+    let failed = if *failures > 0 { format!(", {failures} of them failed") } else { String::new() };
+    let length = format!("{steps} steps ({discarded_steps} discarded), {evaluations} evaluations{failed}\n");
     let advice = summary.advice.join("; ");
-    match (summary.converged, advice.is_empty()) {
-        (true, true) => "Chain converged".to_owned(),
-        (true, false) => format!("Chain converged, but {advice}"),
-        (false, _) => format!("Not converged: do not quote intervals. {advice}"),
-    }
+    length
+        + &match (summary.converged, advice.is_empty()) {
+            (true, true) => "Chain converged".to_owned(),
+            (true, false) => format!("Chain converged, but {advice}"),
+            (false, _) => format!("Not converged: do not quote intervals. {advice}"),
+        }
 }
 
 fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
