@@ -411,7 +411,7 @@ pub fn next_commands(proposal: &Proposal, path: &Path) {
             let rows = [
                 row(format!("  dimcmc map {config} --out map"), "does the model fit? is the map plausible?"),
                 row(format!("  dimcmc periodogram {config} --out search"), "is there a planet, and at which period?"),
-                row(format!("  dimcmc limits {config} --out limits"), "which planets would have been detected?"),
+                row(format!("  dimcmc limits {config} --out limits"), "which planets would have been found?"),
                 row(format!("  dimcmc sample {config} --out run"), "the posterior"),
                 row("  dimcmc report map search limits run".to_owned(), "one HTML page of all of it"),
             ];

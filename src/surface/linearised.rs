@@ -234,12 +234,11 @@ impl SpotField {
 
     /// One line of text.
     pub fn line(&self) -> String {
-        let SpotField { velocity_jitter_kms, ln_evidence, .. } = self;
-        let jitter = with_unit(*velocity_jitter_kms);
+        let jitter = with_unit(self.velocity_jitter_kms);
         let (amplitude, slope, lifetime) = (self.amplitude(), self.slope(), self.lifetime());
         format!(
             "spots (marginalised): amplitude {amplitude}, power-law index {slope} ({}), \
-            lifetime {lifetime}; RV jitter {jitter}; ln Z = {ln_evidence:.1}\n",
+            lifetime {lifetime}; RV jitter {jitter}\n",
             self.spectrum()
         )
     }

@@ -32,7 +32,7 @@ const USUAL_KMS: f64 = 0.03;
 const MOST: f64 = 2.0;
 
 /// Simulated stars for a comparison with 1 %.
-const DRAWS: usize = 2_000;
+pub const DRAWS: usize = 2_000;
 
 /// Nights of two profiles at least: fewer do not distinguish offsets from a jitter.
 const NIGHTS: usize = 3;

@@ -52,12 +52,12 @@ impl Imitation {
         self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
     }
 
-    /// In a few words: `consistent with 2 P_rot`, `alias of P_rot/3 at 1.003/d`.
+    /// In a few words: `consistent with 2 P_rot`, `alias of P_rot/3 by sampling at 1.003/d`.
     pub fn words(&self, rotation_period_d: f64) -> String {
         match &self.alias {
             None => format!("consistent with {}", self.period()),
             Some(alias) => {
-                format!("alias of {} at {:.3}/d", self.period(), alias.window.frequency / rotation_period_d)
+                format!("alias of {} by sampling at {:.3}/d", self.period(), alias.window.frequency / rotation_period_d)
             }
         }
     }
@@ -138,7 +138,7 @@ mod tests {
         assert!(periods.window.iter().any(|peak| (peak.frequency - rotation_period_d).abs() < 1e-12), "{periods:?}");
         let words = |period: f64, sigma: f64| periods.imitated(period, Some(sigma)).map(|i| i.words(rotation_period_d));
         assert_eq!(words(1.985, 0.007).as_deref(), Some("consistent with 2 P_rot"));
-        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("alias of P_rot at 1.000/d"));
+        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("alias of P_rot by sampling at 1.000/d"));
         assert_eq!(words(0.501, 0.0003).as_deref(), Some("consistent with P_rot/2"));
         assert_eq!(words(1.45, 0.004), None);
     }

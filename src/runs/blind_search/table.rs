@@ -8,7 +8,9 @@ use super::record::{
 use crate::inference::detection::HeldOut;
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns, plural};
-use crate::planets::verdict::{decimals, extrapolated, false_alarm, probability, speed};
+use crate::planets::periodogram::nights::{self, NightOffsets};
+use crate::planets::speeds::with_unit;
+use crate::planets::verdict::{CANDIDATE_FAP, decimals, extrapolated, false_alarm, probability, speed};
 use crate::surface::ConstantVelocity;
 
 /// Peaks shown; the file has the others.
@@ -69,7 +71,7 @@ impl PeriodogramFile {
                 None => text += &peaks(&second.peaks, second.false_alarm.draws),
             }
         }
-        text += &robustness(&self.robustness);
+        text += &robustness(&self.robustness, self.false_alarm.draws);
         text += &format!("{}\n", self.co_rotation.statement);
         for warning in &self.warnings {
             text += &format!("warning: {warning}\n");
@@ -85,7 +87,7 @@ impl PeriodogramFile {
 
     /// The significance of the highest peak, the period range, and the weight of single nights.
     pub fn significance(&self) -> Vec<String> {
-        let nights = without_nights(&self.robustness.without_night) + &held_out(&self.robustness);
+        let nights = of_nights(&self.robustness, self.false_alarm.draws);
         let text = format!("{}\n{}\n{nights}", chance(&self.false_alarm), self.searched());
         text.lines().map(|line| format!("{line}.")).collect()
     }
@@ -184,7 +186,7 @@ fn eccentric(orbit: &KeplerianRecord) -> String {
 }
 
 /// K at the best period under other choices, one line each.
-fn robustness(found: &RobustnessRecord) -> String {
+fn robustness(found: &RobustnessRecord, draws: usize) -> String {
     let shown = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
     let row = |what: String, orbit: &QuickRecord| {
         vec![what, shown(orbit.k_kms, 4), shown(orbit.sigma_k_kms, 4), shown(orbit.delta_ln_l, 2)]
@@ -195,7 +197,25 @@ fn robustness(found: &RobustnessRecord) -> String {
         row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
     }));
     let targets = if found.targets.is_empty() { String::new() } else { aligned(&rows) };
-    targets + &without_nights(&found.without_night) + &held_out(found)
+    targets + &of_nights(found, draws)
+}
+
+/// What single nights and their RV offsets mean for the signal, one line each, in a search of so many draws.
+fn of_nights(found: &RobustnessRecord, draws: usize) -> String {
+    without_nights(&found.without_night) + &held_out(found) + &beside_offsets(found, draws)
+}
+
+/// False-alarm probability beside RV offsets of nights of any size, where these do not exclude a planet: above 1 % a
+/// caveat gives it.
+fn beside_offsets(found: &RobustnessRecord, draws: usize) -> String {
+    let told = found.night_offsets.filter(|offsets| offsets.false_alarm_probability <= CANDIDATE_FAP);
+    told.map_or_else(String::new, |NightOffsets { sigma_kms, false_alarm_probability, .. }| {
+        format!(
+            "Beside RV offsets of nights of any size ({} fits best without a planet): {}\n",
+            with_unit(sigma_kms),
+            false_alarm(false_alarm_probability, nights::DRAWS.min(draws))
+        )
+    })
 }
 
 /// Whether held-out nights are predicted better with the planet.
@@ -260,7 +280,7 @@ fn peaks(peaks: &[PeakRecord], draws: usize) -> String {
         let of_period = decimals(peak.orbit.sigma_period_d.unwrap_or(f64::NAN));
         let of_ratio = decimals(peak.orbit.sigma_porb_over_prot.unwrap_or(f64::NAN));
         let note = match &peak.alias {
-            Some(alias) => Some(format!("alias of peak 1 (window peak at {:.3}/d)", alias.window_frequency_per_d)),
+            Some(alias) => Some(format!("alias of peak 1 by sampling at {:.3}/d", alias.window_frequency_per_d)),
             None if on_edge => Some("at the edge".to_owned()),
             None => None,
         };

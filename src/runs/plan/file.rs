@@ -338,7 +338,7 @@ impl ScheduleRecord {
         for at in self.periods.iter().filter(|at| SPOKEN_D.contains(&at.period_d)) {
             if let (Some(k50), Some(k95)) = (at.k50_kms, at.k95_kms) {
                 sentences.push(format!(
-                    "A planet of K = {} and {} d would be detected with 95 % probability, one of {} with 50 %.",
+                    "A planet of K = {} and {} d would be found with 95 % probability, one of {} with 50 %.",
                     speed(k95, 0.1 * k95),
                     at.period_d,
                     speed(k50, 0.1 * k50)
