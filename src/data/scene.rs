@@ -132,7 +132,12 @@ impl Scene {
         report("fitting indicators");
         let named = self.settings.indicators.iter().zip(&self.indicators);
         let named: Vec<(&str, &[Flux])> = named.map(|(of, values)| (&*of.name, &values[..])).collect();
-        match indicators::fitted(&self.imager, self.settings.values, self.settings.known_field(), &named) {
+        match indicators::fitted(
+            &self.imager,
+            self.settings.values.without_planet(),
+            self.settings.known_field(),
+            &named,
+        ) {
             Ok(found) => self.with_indicators(&found),
             Err(error) => {
                 self.measured.indicator_notes.push(format!("not used: {error}"));
@@ -156,7 +161,7 @@ impl Scene {
     fn with_fitted_star(mut self, report: &dyn Fn(&str)) -> Self {
         let (fitted, by_hand) = (self.settings.fitted.clone(), self.by_hand());
         let contrasts = self.fitted_contrasts();
-        let (known, values) = (self.settings.known_field(), self.settings.values);
+        let (known, values) = (self.settings.known_field(), self.settings.values.without_planet());
         let rotation = self.settings.imaging.objective.properties().marginalises && known.lifetime.is_none();
         let is_open = !fitted.is_empty() || by_hand.is_some() || !contrasts.is_empty();
         if !(is_open || rotation) || self.measured.field_start.is_some() {

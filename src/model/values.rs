@@ -111,6 +111,13 @@ impl OrbitValues {
 }
 
 impl ParameterValues {
+    /// The same without the first planet, whatever its orbit.
+    #[must_use]
+    pub fn without_planet(mut self) -> Self {
+        self.first = OrbitValues { orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 }, shape: None };
+        self
+    }
+
     /// From the eight parameters of a circular orbit, rotation and systemic velocity; the surface is that of the star's
     /// settings.
     pub fn of_eight(eight: [f64; 8]) -> Self {

@@ -1,7 +1,7 @@
 //! The fit of star, events and rotation period to the profiles ([`Scene::fitted`]), cached between commands: `map`,
 //! `periodogram`, `limits` and `sample` of one config begin with the same fit, which takes longer than a map.
 //!
-//! It is a file in the user's cache, whose name is a fingerprint of config (but for sampler and priors of orbits),
+//! It is a file in the user's cache, whose name is a fingerprint of config (but for sampler and planet),
 //! observations, program and kind of processor: results of another program or of other data are never used. Only
 //! computing time depends on it: a cache that cannot be read or written is no error.
 
@@ -63,8 +63,7 @@ fn name(scene: &Scene) -> Option<String> {
     hash.update(built.as_nanos().to_le_bytes());
     hash.update([u8::from(vector::is_fused())]);
     hash.update(fit_fingerprint(&scene.settings.resolved));
-    // with orbits: their priors may be where values come from
-    hash.update(format!("{:?}", scene.settings.values));
+    hash.update(format!("{:?}", scene.settings.values.without_planet()));
     hash.update(&scene.data_sha256);
     Some(format!("{:x}.json", hash.finalize()))
 }

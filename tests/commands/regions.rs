@@ -82,9 +82,10 @@ fn what_is_fitted_is_kept_for_the_next_command() {
     std::fs::write(file, measured.to_string()).unwrap();
     map("cache", "second");
     assert_eq!(desk.json("second/fit.json")["measured"]["star"]["gain"], 3.25);
-    // sampler and priors of orbits do not count
+    // sampler and planet do not count
     let mut other = config.clone();
     other["sampler"]["seed"] = json!(99);
+    other["planet"] = json!({ "k_kms": 0.3, "porb_over_prot": 2.2, "phi": 0.1 });
     other["parameters"]["k_kms"] = json!({ "prior": "uniform", "min": 0.0, "max": 0.7 });
     desk.write(CONFIG, &other.to_string());
     map("cache", "second");

@@ -13,15 +13,17 @@ pub(super) fn fingerprint(resolved: &Value) -> String {
 }
 
 /// SHA-256 (hex) of the part of a resolved config that decides what is fitted to the profiles before maps and searches:
-/// neither sampler nor priors of orbits.
+/// neither sampler nor planet, as the fit is without one. A second planet is part of it.
 pub fn fit_fingerprint(resolved: &Value) -> String {
     let mut value = decisive(resolved);
     if let Some(top) = value.as_object_mut() {
         top.remove("sampler");
     }
-    if let Some(free) = value.get_mut("parameters").and_then(Value::as_object_mut) {
-        let orbits = Elements::PLANETS.iter().flat_map(Elements::all);
-        orbits.for_each(|parameter| drop(free.remove(parameter.name())));
+    let [first, _] = &Elements::PLANETS;
+    for section in ["planet", "parameters"] {
+        if let Some(section) = value.get_mut(section).and_then(Value::as_object_mut) {
+            section.retain(|key, _| first.all().into_iter().all(|parameter| parameter.name() != key));
+        }
     }
     sha256(&value)
 }
