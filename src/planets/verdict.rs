@@ -330,11 +330,16 @@ pub fn extrapolated(p: f64, draws: usize) -> Option<String> {
     })
 }
 
+/// Extrapolated probabilities are not given below this: the tail of the fitted noise model is not known there.
+const LEAST_EXTRAPOLATED: f64 = 1e-6;
+
 /// A false-alarm probability in words; where it is extrapolated beyond the simulations, an upper limit with the
-/// extrapolation.
+/// extrapolation, if that is another number.
 pub fn false_alarm(p: f64, draws: usize) -> String {
     match (p, extrapolated(p, draws)) {
         (0.0, _) => "FAP < 1e-300".to_owned(),
+        (p, Some(limit)) if p < LEAST_EXTRAPOLATED => format!("FAP < {limit} (extrapolated: < 1e-6)"),
+        (p, Some(limit)) if format!("{p:.0e}") == limit => format!("FAP < {limit}"),
         (p, Some(limit)) => format!("FAP < {limit} (extrapolated: {p:.0e})"),
         (p, None) => format!("FAP = {}", probability(p)),
     }
@@ -368,6 +373,7 @@ mod tests {
     #[test]
     fn what_simulations_do_not_resolve_is_a_limit() {
         assert_eq!(false_alarm(3e-4, 1000), "FAP < 1e-3 (extrapolated: 3e-4)");
+        assert_eq!(false_alarm(4.9e-4, 2000), "FAP < 5e-4");
         assert_eq!(false_alarm(3e-4, 10_000), "FAP = 3.0e-4");
         assert_eq!(false_alarm(5e-5, 1_000_000), "FAP = 5.0e-5");
         assert_eq!(extrapolated(1e-5, 3000).as_deref(), Some("3.4e-4"));
@@ -426,8 +432,8 @@ mod tests {
         assert_eq!(doubted.finding, Finding::Candidate);
         assert_eq!(
             doubted.sentence,
-            "Candidate: P = 5.069 ± 0.021 d, K = 103 ± 11 m/s, FAP < 1e-4 (extrapolated: 1e-14). Caveats: P consistent \
-            with 2 P_rot."
+            "Candidate: P = 5.069 ± 0.021 d, K = 103 ± 11 m/s, FAP < 1e-4 (extrapolated: < 1e-6). Caveats: P \
+            consistent with 2 P_rot."
         );
         assert_eq!(
             verdict(1e-14, &[]).with(&[Remark::against("driven by a single night", "")]).against,

@@ -104,8 +104,8 @@ impl Detection {
         let sigma_kms = best.k_kms / (2.0 * best.delta_ln_l).sqrt();
         (self.is_candidate() && night_kms > 0.0).then(|| {
             Remark::note(format!(
-                "RV offsets of nights of {} count in the FAP, not in K ± σ_K of search and posterior: with them σ_K is \
-                about {}. If the spectrograph's are known, set observations.night_jitter_kms.",
+                "Uncertainties of K are without RV offsets of nights. With those of {}, which count in the FAP, σ_K is \
+                about {}: quote that, unless the spectrograph is more stable (observations.night_jitter_kms).",
                 with_unit(night_kms),
                 with_unit(sigma_kms)
             ))

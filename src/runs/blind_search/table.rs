@@ -211,9 +211,9 @@ fn beside_offsets(found: &RobustnessRecord, draws: usize) -> String {
     let told = found.night_offsets.filter(|offsets| offsets.false_alarm_probability <= CANDIDATE_FAP);
     told.map_or_else(String::new, |NightOffsets { sigma_kms, false_alarm_probability, .. }| {
         format!(
-            "Beside RV offsets of nights of any size ({} fits best without a planet): {}\n",
-            with_unit(sigma_kms),
-            false_alarm(false_alarm_probability, nights::DRAWS.min(draws))
+            "If RV offsets of nights may be of any size: {} ({} fits best without a planet)\n",
+            false_alarm(false_alarm_probability, nights::DRAWS.min(draws)),
+            with_unit(sigma_kms)
         )
     })
 }
@@ -251,7 +251,7 @@ fn without_nights(nights: &[NightRecord]) -> String {
 }
 
 fn chance(alarm: &FalseAlarmRecord) -> String {
-    let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
+    let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
     let offsets = match alarm.night_offsets_kms {
         kms if kms > 0.0 => format!(" with RV offsets of nights of {:.0} m/s", 1000.0 * kms),
@@ -259,7 +259,7 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
     };
     let tail = if used == "draws" { "" } else { ", an extreme-value tail fitted to these" };
     format!(
-        "Δln L = {delta_ln_l:.2}, {}; {draws} simulations{offsets}{tail}, N_ind ≈ {independent_periods:.0}\n\
+        "Δln L = {delta_ln_l:.2}, {}; {draws} simulations{offsets}{tail}\n\
         Thresholds of Δln L at FAP = 10, 1, 0.1 %: {}",
         false_alarm(*p, *draws),
         levels.join(", ")
