@@ -287,7 +287,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         ("amplitude", format!("{} (SD of the spot filling factor){}", field.amplitude(), caveat("spot_amplitude"))),
         ("power-law index", format!("{} ({}){}", field.slope(), field.spectrum(), caveat("spot_slope"))),
         ("lifetime", field.lifetime() + &caveat("spot_lifetime_d")),
-        ("RV jitter", with_unit(field.velocity_jitter_kms)),
+        ("RV jitter", format!("{} (without a planet)", with_unit(field.velocity_jitter_kms))),
         ("ln Z", format!("{:.2}", field.ln_evidence)),
     ]
 }

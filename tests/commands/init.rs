@@ -312,7 +312,7 @@ fn a_line_that_is_wrong_is_put_right_or_named() {
             "star.fitted",
             "line_sigma_kms, equivalent_width_kms",
             "note: test fit: evolving maps fit",
-            "note: fitted star: line sigma ",
+            "note: star: line sigma ",
         ],
     );
     let mut config = desk.json("star.json");

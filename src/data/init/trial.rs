@@ -390,7 +390,7 @@ impl Trial {
                 format!("test fit: {maps}, but not to within the uncertainties: {}{larger}", diagnosis.text)
             }
         };
-        let star = self.star.as_ref().map(|star| format!("fitted star: {star}"));
+        let star = self.star.as_ref().map(|star| format!("star: {star}"));
         let indicators = self.indicators.iter().map(|found| format!("indicator {found}"));
         vsini.into_iter().chain([ending]).chain(star).chain(indicators).chain(self.warnings.iter().cloned()).collect()
     }

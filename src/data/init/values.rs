@@ -303,7 +303,10 @@ impl Values {
                 // of static maps none are fitted
                 if draft.imaging.objective.properties().has_field {
                     let remark = match draft.instrument.name {
-                        Some(_) => "RV offsets of nights, up to twice the stability of the spectrograph".to_owned(),
+                        Some(_) => format!(
+                            "RV offsets of nights, up to {}, twice the stability of the spectrograph",
+                            with_unit(most_offset_kms(draft.instrument.stability_ms.map(|ms| ms / 1e3)))
+                        ),
                         None => format!(
                             "RV offsets of nights, up to {} as no spectrograph is named: they hide small planets; \
                             --instrument",

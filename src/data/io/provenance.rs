@@ -190,8 +190,8 @@ impl Measured {
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("RV jitter", jitter.line()));
-        let star = self.star.as_ref().map(|star| ("fitted star", star.line()));
-        let events = self.events.as_ref().and_then(Events::line).map(|line| ("events", line));
+        let star = self.star.as_ref().map(|star| ("star", star.line()));
+        let events = self.events.as_ref().and_then(Events::line).map(|line| ("outliers", line));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
             let Season { first_d, last_d, profiles, .. } = season;

@@ -202,8 +202,8 @@ fn footer(html: &mut String, page: &Page) {
     html.push_str("<footer id=\"cite\">\n<h2>How to cite</h2>\n");
     let _ = writeln!(
         html,
-        "<p>The method: P. Petit, J.-F. Donati, E. Hébrard, et al. (2015), <i>{}</i>, {} {}, {}, <a \
-         href=\"https://doi.org/{doi}\">doi:{doi}</a>.</p>",
+        "<p>Static maps with an orbit inside, on which the method builds: P. Petit, J.-F. Donati, E. Hébrard, et al. \
+         (2015), <i>{}</i>, {} {}, {}, <a href=\"https://doi.org/{doi}\">doi:{doi}</a>.</p>",
         escape(paper.title),
         escape(paper.journal),
         paper.volume,

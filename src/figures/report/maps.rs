@@ -88,7 +88,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
         ("power-law index", field.slope() + &caveat("spot_slope")),
         ("turnover degree ℓ_b", number(field.spot_break_degree, 1)),
         ("spot lifetime (d)", lifetime_d + &caveat("spot_lifetime_d")),
-        ("RV jitter", with_unit(field.velocity_jitter_kms)),
+        ("RV jitter, without a planet", with_unit(field.velocity_jitter_kms)),
         ("ln *Z*", number(field.ln_evidence, 2)),
     ]
 }

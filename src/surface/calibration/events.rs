@@ -81,9 +81,11 @@ impl Events {
         }
         let all = named.iter().map(of).collect::<Vec<_>>().join(", ");
         let line = || match self.profiles.len() {
-            1 => format!("outlier profile {all}"),
-            many if many > NAMED => format!("{many} outlier profiles (all in measured.events); largest: {all}"),
-            _ => format!("outlier profiles {all}"),
+            1 => format!("not predicted by the others: profile {all}"),
+            many if many > NAMED => {
+                format!("not predicted by the others: {many} profiles (all in measured.events); largest: {all}")
+            }
+            _ => format!("not predicted by the others: profiles {all}"),
         };
         self.too_many().or((!self.profiles.is_empty()).then(line))
     }
@@ -107,10 +109,13 @@ mod tests {
         by_hand[0] = ByHand::Event;
         assert_eq!(Events::among((1..=5).map(event).collect(), &by_hand).profiles.len(), 5);
         let one = Events::among(vec![event(3)], &by_hand).line().unwrap();
-        assert_eq!(one, "outlier profile 3 (0.1000 d, uncertainties × 2.5)");
+        assert_eq!(one, "not predicted by the others: profile 3 (0.1000 d, uncertainties × 2.5)");
         let larger = |k: usize| Event { sigma_factor: k as f64, ..event(k) };
         let seven = Events::among((1..=7).map(larger).collect(), &[ByHand::Event; 24]).line().unwrap();
-        assert!(seven.starts_with("7 outlier profiles (all in measured.events); largest: 7 (0.1000 d"), "{seven}");
+        assert!(
+            seven.starts_with("not predicted by the others: 7 profiles (all in measured.events); largest: 7 (0.1000 d"),
+            "{seven}"
+        );
         assert!(seven.ends_with(", 3 (0.1000 d, uncertainties × 3.0)"), "{seven}");
     }
 }

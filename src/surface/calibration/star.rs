@@ -247,9 +247,7 @@ impl MeasuredStar {
                 true => format!("Δln Z = {gain:.1}, {NEEDED} needed"),
                 false => format!("Δln Z = {gain:.1}, but the fitted values are too far from their priors"),
             };
-            return format!(
-                "stellar parameters as in the config, active regions with the photosphere's line (a fit: {why})"
-            );
+            return format!("values of the config kept: not improved by fitting line and active regions ({why})");
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
             let name = name.trim_end_matches("_kms").replace('_', " ");
