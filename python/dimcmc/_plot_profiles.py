@@ -69,7 +69,7 @@ def profiles(result: Result, numbers: Arrays) -> Sheet:
     spacing = 0.5 * (high - low)
 
     def paint(part: list[_Line], slots: int, first: bool, panel: Any) -> None:
-        names: dict[str, str | None] = {"observed": "observed", "model": "model", "event": "event"}
+        names: dict[str, str | None] = {"observed": "observed", "model": "model", "event": "outlier"}
         for row, line in enumerate(part):
             kind = "event" if line.is_event else "observed"
             colour = PURPLE if line.is_event else ink()

@@ -143,7 +143,7 @@ class _Velocities:
     def rings(self, panel: Any, x: Array, y: Array) -> None:
         """Rings around events."""
         if self.events.any():
-            look = {"markerfacecolor": "none", "markersize": 6.5, "color": PURPLE, "label": "event"}
+            look = {"markerfacecolor": "none", "markersize": 6.5, "color": PURPLE, "label": "outlier"}
             panel.plot(x[self.events], y[self.events], "o", **look)
 
 

@@ -168,7 +168,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     if modelled {
         legend.add(Key::Line(MODEL), "model");
         if eventful {
-            legend.add(Key::Line(EVENT), "event");
+            legend.add(Key::Line(EVENT), "outlier");
         }
         legend.row(&mut figure, [legend_middle, 9.0]);
     }

@@ -232,7 +232,7 @@ impl Curves<'_> {
         figure.text(&clock.label, [middle, below + 19.0], Font::LABEL, Align::Centre, 0.0);
         let mut legend = legend(&self.moments);
         if !self.events.is_empty() {
-            legend.add(Key::Point(EVENT.0, EVENT.2), "event");
+            legend.add(Key::Point(EVENT.0, EVENT.2), "outlier");
         }
         if self.folds() {
             legend.add(Key::Line(ORBIT), self.orbit_is);

@@ -86,7 +86,8 @@ fn search(file: &PeriodogramFile) -> Chapter {
     notes.extend(file.evidence.as_ref().map(|evidence| evidence.sentence.clone()));
     let unit = Speeds::of(&file.peaks.iter().map(|peak| peak.orbit.k_kms).collect::<Vec<_>>());
     let peak = |peak: &PeakRecord| {
-        let alias = peak.alias.as_ref().map(|alias| format!("of 1 at {:.3}/d", alias.window_frequency_per_d));
+        let alias =
+            peak.alias.as_ref().map(|alias| format!("of peak 1 by sampling at {:.3}/d", alias.window_frequency_per_d));
         vec![
             number(peak.orbit.period_d, digits_of(peak.orbit.sigma_period_d, PERIOD_DIGITS)),
             number(unit.factor * peak.orbit.k_kms, digits_of(Some(unit.factor * peak.orbit.sigma_k_kms), 3)),
@@ -99,8 +100,8 @@ fn search(file: &PeriodogramFile) -> Chapter {
         ]
     };
     let beside = file.other_known().iter().map(|planet| &planet.verdict);
-    let k = format!("*K* ({})", unit.name);
-    let head = ["period (d)", &k, "*σ*_{K}", "Δ ln *L*", "FAP", "alias", "rotation"];
+    let [k, sigma] = ["*K*", "*σ*_{K}"].map(|symbol| format!("{symbol} ({})", unit.name));
+    let head = ["period (d)", &k, &sigma, "Δ ln *L*", "FAP", "alias", "rotation"];
     Chapter {
         heading: "Search for a planet".into(),
         verdicts: std::iter::once(&file.verdict).chain(beside).chain(&file.blind).map(verdicts::of).collect(),

@@ -1,6 +1,6 @@
 //! The part of a report on the maps of a star.
 
-use super::chapter::{Chapter, Tone, number, pairs, parameters, tone};
+use super::chapter::{Chapter, NOTHING, Tone, number, pairs, parameters, tone};
 use crate::data::io::map::FitFile;
 use crate::model::Parameter;
 use crate::planets::speeds::with_unit;
@@ -19,17 +19,18 @@ pub(super) fn chapter(file: &FitFile) -> Chapter {
     ]);
     rows.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
     let moments = match fit.image {
-        Some(_) => "rms of the radial velocities (km/s)",
-        None => "rms of the first moments (km/s)",
+        Some(_) => "rms of the radial velocities",
+        None => "rms of the first moments",
     };
-    rows.push((moments, number(fit.observed_rv_rms_kms, 4)));
+    let velocity = |kms: Option<f64>| kms.map_or_else(|| NOTHING.into(), with_unit);
+    rows.push((moments, velocity(fit.observed_rv_rms_kms.into())));
     if fit.filtered_rv_rms_kms.is_some() {
-        rows.push(("rms of the filtered velocities (km/s)", number(fit.filtered_rv_rms_kms, 4)));
-        rows.push(("photon noise of a radial velocity (km/s)", number(fit.photon_rv_error_kms, 4)));
+        rows.push(("rms of the filtered velocities", velocity(fit.filtered_rv_rms_kms)));
+        rows.push(("photon noise of a radial velocity", velocity(fit.photon_rv_error_kms.into())));
     }
     rows.extend([
-        ("rms of the velocities, spots marginalised out (km/s)", number(fit.rv_rms_kms, 4)),
-        ("their uncertainty (km/s)", number(fit.rv_error_kms, 4)),
+        ("rms of the velocities, spots marginalised out", velocity(fit.rv_rms_kms)),
+        ("their uncertainty", velocity(fit.rv_error_kms)),
         ("rms of the residuals", number(fit.residual_rms, 6)),
         ("pixels", fit.pixels.to_string()),
     ]);
@@ -86,7 +87,7 @@ fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
     vec![
         ("spot amplitude (SD of the filling factor)", field.amplitude() + &caveat("spot_amplitude")),
         ("power-law index", field.slope() + &caveat("spot_slope")),
-        ("turnover degree ℓ_b", number(field.spot_break_degree, 1)),
+        ("turnover degree *ℓ*_{b}", number(field.spot_break_degree, 1)),
         ("spot lifetime (d)", lifetime_d + &caveat("spot_lifetime_d")),
         ("RV jitter, without a planet", with_unit(field.velocity_jitter_kms)),
         ("ln *Z*", number(field.ln_evidence, 2)),

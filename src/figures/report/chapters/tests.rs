@@ -76,8 +76,8 @@ fn a_search_is_headed_by_its_own_verdict_and_nothing_is_green_beside_a_warning()
     assert_eq!(chapter.tables[0].1.rows.len(), 5);
     // no column for spots, one for aliases
     let peaks = chapter.tables[1].1.without_empty_columns();
-    assert_eq!(peaks.head, ["period (d)", "*K* (m/s)", "*σ*_{K}", "Δ ln *L*", "FAP", "alias"]);
-    assert_eq!(peaks.rows[1], ["1.33", "100", "10", "20.00", "< 1e-3", "of 1 at 1.003/d"]);
+    assert_eq!(peaks.head, ["period (d)", "*K* (m/s)", "*σ*_{K} (m/s)", "Δ ln *L*", "FAP", "alias"]);
+    assert_eq!(peaks.rows[1], ["1.33", "100", "10", "20.00", "< 1e-3", "of peak 1 by sampling at 1.003/d"]);
 }
 
 #[test]
