@@ -336,13 +336,14 @@ const LEAST_EXTRAPOLATED: f64 = 1e-6;
 /// A false-alarm probability in words; where it is extrapolated beyond the simulations, an upper limit with the
 /// extrapolation, if that is another number.
 pub fn false_alarm(p: f64, draws: usize) -> String {
-    match (p, extrapolated(p, draws)) {
-        (0.0, _) => "FAP < 1e-300".to_owned(),
-        (p, Some(limit)) if p < LEAST_EXTRAPOLATED => format!("FAP < {limit} (extrapolated: < 1e-6)"),
-        (p, Some(limit)) if format!("{p:.0e}") == limit => format!("FAP < {limit}"),
-        (p, Some(limit)) => format!("FAP < {limit} (extrapolated: {p:.0e})"),
-        (p, None) => format!("FAP = {}", probability(p)),
-    }
+    let Some(limit) = extrapolated(p, draws) else { return format!("FAP = {}", probability(p)) };
+    let beyond = match p.max(LEAST_EXTRAPOLATED) {
+        least if least * draws as f64 >= 1.0 => return format!("FAP < {limit}"),
+        p if format!("{p:.0e}") == limit => return format!("FAP < {limit}"),
+        LEAST_EXTRAPOLATED => "< 1e-6".to_owned(),
+        p => format!("{p:.0e}"),
+    };
+    format!("FAP < {limit} (extrapolated: {beyond})")
 }
 
 /// A velocity (km/s) with as many digits as its uncertainty allows, in m/s below 1 km/s.
@@ -377,7 +378,8 @@ mod tests {
         assert_eq!(false_alarm(3e-4, 10_000), "FAP = 3.0e-4");
         assert_eq!(false_alarm(5e-5, 1_000_000), "FAP = 5.0e-5");
         assert_eq!(extrapolated(1e-5, 3000).as_deref(), Some("3.4e-4"));
-        assert_eq!(false_alarm(0.0, 10_000), "FAP < 1e-300");
+        assert_eq!(false_alarm(0.0, 10_000), "FAP < 1e-4 (extrapolated: < 1e-6)");
+        assert_eq!(false_alarm(1e-9, 2_000_000), "FAP < 5e-7");
         let few = Verdict::new(3e-4, 1000, SIGNAL, &[]);
         assert!(few.sentence.contains("FAP < 1e-3 (extrapolated: 3e-4)"), "{}", few.sentence);
         // a file without their number has the usual one

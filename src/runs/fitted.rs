@@ -1,7 +1,7 @@
 //! The fit of star, events and rotation period to the profiles ([`Scene::fitted`]), cached between commands: `map`,
 //! `periodogram`, `limits` and `sample` of one config begin with the same fit, which takes longer than a map.
 //!
-//! It is a file in the user's cache, whose name is a fingerprint of config (but for sampler and planet),
+//! It is a file in the user's cache, whose name is a fingerprint of config (but for sampler and first planet),
 //! observations, program and kind of processor: results of another program or of other data are never used. Only
 //! computing time depends on it: a cache that cannot be read or written is no error.
 

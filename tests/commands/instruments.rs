@@ -49,6 +49,9 @@ fn each_list_has_its_spectrograph() {
     let second = &config["observations"][1];
     assert!(second["resolving_power"] == 110_000.0 && second.get("wavelength_nm").is_none(), "{second}");
 
+    let stable = desk.succeed(&["init", "data/observations.txt", "--instrument", "harps", "--out", "stable.json"]);
+    says(&stable, &["RV offsets of nights, up to 2.0 m/s, twice the stability of the spectrograph"]);
+
     let three = [&both[..], &["--instrument", "harps,harps,harps", "--out", "no.json"]].concat();
     says(&desk.refusal(&three), &["--instrument: 3 values, and 2 of what they are for"]);
 }

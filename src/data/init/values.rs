@@ -6,7 +6,7 @@ use super::ledger::{Ledger, Source, origin};
 use super::line;
 use crate::data::config::{
     Automatic, Beside, Draft, EquivalentWidth, FITTED, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw,
-    Line, LineShape, ObservationsSection, Sought, Star, VelocityJitter,
+    Line, LineShape, ObservationsSection, Sought, Spectrograph, Star, VelocityJitter,
 };
 use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
@@ -303,9 +303,9 @@ impl Values {
                 // of static maps none are fitted
                 if draft.imaging.objective.properties().has_field {
                     let remark = match draft.instrument.name {
-                        Some(_) => format!(
+                        Some(ref name) => format!(
                             "RV offsets of nights, up to {}, twice the stability of the spectrograph",
-                            with_unit(most_offset_kms(draft.instrument.stability_ms.map(|ms| ms / 1e3)))
+                            with_unit(most_offset_kms(Spectrograph::named(name).map(|of| of.stability_ms / 1e3)))
                         ),
                         None => format!(
                             "RV offsets of nights, up to {} as no spectrograph is named: they hide small planets; \

@@ -48,6 +48,15 @@ fn is_evolving(config: &Value) -> bool {
     config.pointer("/imaging/objective").and_then(Value::as_str) == Some("marginal-likelihood")
 }
 
+/// Whether a search fits RV offsets of nights: beside a fitted jitter, where no data set has its own.
+fn are_nights_fitted(config: &Value) -> bool {
+    let observations = config.get("observations").unwrap_or(&Value::Null);
+    let sets = observations.as_array().map_or(std::slice::from_ref(observations), Vec::as_slice);
+    let is_given = |set: &Value, key: &str| set.get(key).is_some_and(Value::is_number);
+    let is_held = |set: &Value| is_given(set, "velocity_jitter_kms") || is_given(set, "night_jitter_kms");
+    is_evolving(config) && !sets.iter().any(is_held)
+}
+
 /// Values of the config: those that are held fixed, and the defaults that decide on planets.
 pub(super) fn fixed(config: &Value) -> Table {
     let is_free = |pointer: &str| {
@@ -57,10 +66,11 @@ pub(super) fn fixed(config: &Value) -> Table {
     let evolves = is_evolving(config);
     let row = |(pointer, name, unit): &(&str, &str, &str)| {
         let is_idle = evolves && STATIC.contains(pointer);
-        if *pointer == NIGHTS && evolves && config.pointer(pointer).is_none_or(Value::is_null) {
+        if *pointer == NIGHTS && are_nights_fitted(config) {
             let stability_kms = config.pointer("/instrument/stability_ms").and_then(Value::as_f64).map(|x| x / 1e3);
             let most = with_unit(most_offset_kms(stability_kms));
-            return Some(vec![(*name).to_owned(), format!("up to {most} in the FAP; none in K and its uncertainty")]);
+            let text = format!("up to {most} in the FAP, where nights of several profiles show them; none in K");
+            return Some(vec![(*name).to_owned(), text]);
         }
         let value = config.pointer(pointer).filter(|value| !value.is_null() && !is_free(pointer) && !is_idle)?;
         let unit = if unit.is_empty() || !value.is_number() { String::new() } else { format!(" {unit}") };
@@ -94,13 +104,17 @@ pub(super) fn priors(config: &Value) -> Table {
     table(&["parameter", "prior", "range"], rows.into_iter().map(|(_, row)| row).collect())
 }
 
-/// Normal priors of the line and of active regions, where they are fitted before maps and searches.
+/// Normal priors of the line and of active regions, where they are fitted before maps and searches; static maps do not
+/// fit them.
 pub(super) fn fitted(config: &Value) -> Table {
     let at = |key: &str| config.pointer(&format!("/{}", key.replace('.', "/"))).filter(|value| !value.is_null());
     let named = at("star.fitted").and_then(Value::as_array).into_iter().flatten();
     let of_line = named.filter_map(|name| Parameter::from_name(name.as_str()?));
     let of_regions = Parameter::REGIONS.into_iter().filter(|region| at(region.spec().config_key).is_none());
-    let of_regions = of_regions.filter(|_| is_evolving(config));
+    // without regions beyond spots their line has no effect
+    let areas = &Parameter::REGIONS[3..];
+    let are_spots = areas.iter().all(|area| at(area.spec().config_key).and_then(Value::as_f64) == Some(0.0));
+    let of_regions = of_regions.filter(|_| !are_spots);
     let row = |parameter: Parameter| {
         let value = match at(parameter.spec().config_key) {
             Some(Value::Array(list)) => list.first().and_then(Value::as_f64),
@@ -115,7 +129,8 @@ pub(super) fn fitted(config: &Value) -> Table {
         let meaning = parameter.spec().about.split([':', '.']).next().unwrap_or_default();
         vec![label(parameter.name()), meaning.to_owned(), prior.trim_end().to_owned()]
     };
-    table(&["parameter", "meaning", "normal prior"], of_line.chain(of_regions).map(row).collect())
+    let all = of_line.chain(of_regions).filter(|_| is_evolving(config));
+    table(&["parameter", "meaning", "normal prior"], all.map(row).collect())
 }
 
 /// Keys in which the configs of several folders differ: key, and its value in each.
@@ -213,9 +228,16 @@ mod tests {
         assert!(nights(&config).unwrap()[1].starts_with("up to 60 m/s in the FAP"));
         config["observations"] = json!({ "night_jitter_kms": 0.0 });
         assert_eq!(nights(&config).unwrap()[1], "0 km/s");
+        for held in [json!({ "velocity_jitter_kms": 0.0 }), json!([{ "night_jitter_kms": 0.01 }, {}])] {
+            config["observations"] = held;
+            assert!(nights(&config).is_none());
+        }
+        config["observations"] = json!([{ "velocity_jitter_kms": "fitted" }, {}]);
+        assert!(nights(&config).is_some());
+        config["star"]["regions"] = json!({ "area": 0.0, "area_limb": 0.0, "dimming_limb": 0 });
+        assert_eq!(fitted(&config).rows.len(), 2);
         config["imaging"]["objective"] = json!("spottedness");
-        config["observations"] = Value::Null;
-        assert!(nights(&config).is_none() && fitted(&config).rows.len() == 2);
+        assert!(nights(&config).is_none() && fitted(&config).rows.is_empty());
     }
 
     #[test]

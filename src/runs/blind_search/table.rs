@@ -71,7 +71,7 @@ impl PeriodogramFile {
                 None => text += &peaks(&second.peaks, second.false_alarm.draws),
             }
         }
-        text += &robustness(&self.robustness, self.false_alarm.draws);
+        text += &robustness(&self.robustness, self.blind_draws());
         text += &format!("{}\n", self.co_rotation.statement);
         for warning in &self.warnings {
             text += &format!("warning: {warning}\n");
@@ -85,9 +85,14 @@ impl PeriodogramFile {
         format!("Searched: {min_period_d:.3} to {max_period_d:.1} d ({periods} periods)")
     }
 
+    /// Simulations of the search where it decides the verdict: known planets are judged without them.
+    fn blind_draws(&self) -> Option<usize> {
+        self.known_planets.is_empty().then_some(self.false_alarm.draws)
+    }
+
     /// The significance of the highest peak, the period range, and the weight of single nights.
     pub fn significance(&self) -> Vec<String> {
-        let nights = of_nights(&self.robustness, self.false_alarm.draws);
+        let nights = of_nights(&self.robustness, self.blind_draws());
         let text = format!("{}\n{}\n{nights}", chance(&self.false_alarm), self.searched());
         text.lines().map(|line| format!("{line}.")).collect()
     }
@@ -186,7 +191,7 @@ fn eccentric(orbit: &KeplerianRecord) -> String {
 }
 
 /// K at the best period under other choices, one line each.
-fn robustness(found: &RobustnessRecord, draws: usize) -> String {
+fn robustness(found: &RobustnessRecord, draws: Option<usize>) -> String {
     let shown = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
     let row = |what: String, orbit: &QuickRecord| {
         vec![what, shown(orbit.k_kms, 4), shown(orbit.sigma_k_kms, 4), shown(orbit.delta_ln_l, 2)]
@@ -200,16 +205,16 @@ fn robustness(found: &RobustnessRecord, draws: usize) -> String {
     targets + &of_nights(found, draws)
 }
 
-/// What single nights and their RV offsets mean for the signal, one line each, in a search of so many draws.
-fn of_nights(found: &RobustnessRecord, draws: usize) -> String {
+/// What single nights and their RV offsets mean for the signal, one line each; `draws` of a search that decides the verdict.
+fn of_nights(found: &RobustnessRecord, draws: Option<usize>) -> String {
     without_nights(&found.without_night) + &held_out(found) + &beside_offsets(found, draws)
 }
 
 /// False-alarm probability beside RV offsets of nights of any size, where these do not exclude a planet: above 1 % a
 /// caveat gives it.
-fn beside_offsets(found: &RobustnessRecord, draws: usize) -> String {
-    let told = found.night_offsets.filter(|offsets| offsets.false_alarm_probability <= CANDIDATE_FAP);
-    told.map_or_else(String::new, |NightOffsets { sigma_kms, false_alarm_probability, .. }| {
+fn beside_offsets(found: &RobustnessRecord, draws: Option<usize>) -> String {
+    let told = found.night_offsets.filter(|offsets| offsets.false_alarm_probability <= CANDIDATE_FAP).zip(draws);
+    told.map_or_else(String::new, |(NightOffsets { sigma_kms, false_alarm_probability, .. }, draws)| {
         format!(
             "If RV offsets of nights may be of any size: {} ({} fits best without a planet)\n",
             false_alarm(false_alarm_probability, nights::DRAWS.min(draws)),

@@ -52,8 +52,7 @@ pub fn hold(
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(Parameter::SpotLifetime.usual()));
     let known = Known { lifetime: Some(lifetime), ..known };
     let systemic: Vec<Nuisance> = nuisances.iter().copied().filter(|n| n.parameter == Parameter::Vsys).collect();
-    let mut values = values;
-    values.set(Parameter::K, 0.0);
+    let mut values = values.without_planet();
     let mut near = None;
     for _ in 0..ROUNDS {
         let here = linearised(imager, usual(imager, &basis, values, known, near.as_ref())?, &systemic)?;
