@@ -205,7 +205,8 @@ fn robustness(found: &RobustnessRecord, draws: Option<usize>) -> String {
     targets + &of_nights(found, draws)
 }
 
-/// What single nights and their RV offsets mean for the signal, one line each; `draws` of a search that decides the verdict.
+/// What single nights and their RV offsets mean for the signal, one line each; `draws` are those of a search that
+/// decides the verdict.
 fn of_nights(found: &RobustnessRecord, draws: Option<usize>) -> String {
     without_nights(&found.without_night) + &held_out(found) + &beside_offsets(found, draws)
 }
