@@ -8,7 +8,6 @@ use crate::data::dataset::Dataset;
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
-use crate::model::Parameter;
 use crate::numerics::quantile::middle;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
 use crate::runs::fitted::fitted;
@@ -318,8 +317,7 @@ impl Campaign {
 fn taken(config: &Config, report: &dyn Fn(&str)) -> Result<Taken, CampaignError> {
     let scene = fitted(Scene::new(config)?, report);
     let known = scene.surface().field.unwrap_or_default();
-    let mut values = scene.settings.values;
-    values.set(Parameter::K, 0.0);
+    let values = scene.settings.values.without_planet();
     let found = fit(&scene.imager, &Arc::new(Basis::new(&scene.imager.grid)), values, known, None);
     let found = found.map_err(|source| CampaignError::Field { path: scene.settings.path.clone(), source })?;
     Ok(Taken { scene, marginal: Arc::new(found.marginal) })

@@ -244,10 +244,10 @@ impl MeasuredStar {
         let MeasuredStar { numbers, mean_profile, gain, .. } = self;
         if numbers.is_empty() {
             let why = match *gain < NEEDED {
-                true => format!("Δln Z = {gain:.1}, {NEEDED} needed"),
-                false => format!("Δln Z = {gain:.1}, but the fitted values are too far from their priors"),
+                true => format!("are not better (Δln Z = {gain:.1}, {NEEDED} needed)"),
+                false => format!("are too far from their priors (Δln Z = {gain:.1})"),
             };
-            return format!("values of the config kept: not improved by fitting line and active regions ({why})");
+            return format!("values of the config kept: fitted line and active regions {why}");
         }
         let of = |FittedNumber { name, value, sigma }: &FittedNumber| {
             let name = name.trim_end_matches("_kms").replace('_', " ");

@@ -92,7 +92,7 @@ impl Change {
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
         let shortened = |still: &Fitted| shortened(imager, &basis, still, time_base_d);
         let unchanging = known.unchanging();
-        let alone = usual(imager, &basis, without_planet(values), unchanging, None)?;
+        let alone = usual(imager, &basis, values.without_planet(), unchanging, None)?;
         let values = with_best_orbit(&alone.marginal)?;
         let still = usual(imager, &basis, values, unchanging, Some(&alone.marginal))?;
         if let Some(best) = shortened(&still)?.filter(|best| best.gain < NOTHING) {
@@ -176,11 +176,6 @@ fn shortened(
     Ok(best)
 }
 
-fn without_planet(mut values: ParameterValues) -> ParameterValues {
-    values.set(Parameter::K, 0.0);
-    values
-}
-
 /// `values` with the best orbit, the field as in `near`.
 fn with_best_orbit(
     near: &Marginal,
@@ -196,7 +191,7 @@ fn with_best_orbit(
         .iter()
         .filter_map(|trial| Some((trial.frequency, trial.orbit?)))
         .max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
-    let Some((frequency, orbit)) = best else { return Ok(without_planet(values)) };
+    let Some((frequency, orbit)) = best else { return Ok(values.without_planet()) };
     values.set(Parameter::K, orbit.k_kms);
     values.set(Parameter::PorbOverProt, 1.0 / frequency);
     values.set(Parameter::Phi, orbit.phi);

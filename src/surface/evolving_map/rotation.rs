@@ -8,7 +8,7 @@
 use super::fit::{fit, share_of_many};
 use super::{Assumed, Basis, Design, Known, Marginal};
 use crate::field::{Field, Kernel, Lifetime};
-use crate::model::{Parameter, ParameterValues};
+use crate::model::ParameterValues;
 use crate::surface::imaging::Imager;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -62,9 +62,8 @@ impl OtherRotation {
             return None;
         }
         let turning = |period_d: f64| {
-            let mut values = values;
+            let mut values = values.without_planet();
             values.star.omega_eq_rad_d = TAU / period_d;
-            values.set(Parameter::K, 0.0);
             values
         };
         let (share, basis) = (share_of_many(imager), Arc::new(Basis::coarse(&imager.grid, DEGREE)));

@@ -118,9 +118,8 @@ struct Climb<'a> {
 ///
 /// # Errors
 /// [`NoFit`].
-pub fn coarsely(imager: &Imager, mut values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
-    values.set(Parameter::K, 0.0);
-    fit(imager, &Arc::new(Basis::coarse(&imager.grid, DEGREE)), values, known, None)
+pub fn coarsely(imager: &Imager, values: ParameterValues, known: Known) -> Result<Fitted, NoFit> {
+    fit(imager, &Arc::new(Basis::coarse(&imager.grid, DEGREE)), values.without_planet(), known, None)
 }
 
 /// The slopes of drifts of the velocities (km/s per day) by the field `near`, without an orbit, where one is steep.
