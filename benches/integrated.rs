@@ -88,7 +88,7 @@ fn measure(profiles: usize, table: &mut Table) {
             prior: Prior::Uniform { min: 0.0, max: 3000.0 },
         };
         let space = scene.space_of(&free.iter().map(wide).collect::<Vec<_>>());
-        let held = Held { break_degree: Known::default().break_degree(), jitter_kms: 0.0 };
+        let held = Held { break_degree: Known::default().break_degree(), jitter_kms: 0.0, night_kms: 0.0 };
         MarginalPosterior::new(scene.imager.clone(), &space, values, held).expect("a reference")
     };
     // at this distance, another point each time

@@ -120,7 +120,7 @@ fn main() {
         let per_cycle: Vec<f64> = periods.iter().map(|period_d| prot / period_d).collect();
         let (sigma, assumed) =
             achieved(&config, &per_cycle, before.as_ref().and_then(|text| fitted_before(text, seed)));
-        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = assumed;
+        let Assumed { field: Field { spectrum, kernel }, jitter_kms, .. } = assumed;
         let lifetime_d = kernel.lifetime.days().unwrap_or(f64::INFINITY);
         println!(
             "{seed} {} {:.4} {:.3} {lifetime_d:.2} {jitter_kms:.4} {:.5} {:.1}",
@@ -137,7 +137,8 @@ fn main() {
         (of(|assumed| assumed.field.spectrum.amplitude), of(|assumed| assumed.field.spectrum.slope));
     let spectrum = Spectrum { amplitude, slope, ..stars[0].assumed.field.spectrum };
     let lifetime = of(|assumed| assumed.field.kernel.lifetime.days().unwrap_or(f64::INFINITY));
-    let typical = Assumed { field: Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime)) }, jitter_kms: 0.0 };
+    let field = Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime)) };
+    let typical = Assumed { field, jitter_kms: 0.0, night_kms: 0.0 };
     println!("typical spots: {typical:?}");
     println!("achieved over forecast sigma_K: median over stars of the median over periods, scatter of the stars,");
     println!("largest deviation of a period's median over stars");

@@ -363,7 +363,7 @@ impl Detection {
 
     /// Linearises the star with the best orbit until that orbit converges.
     fn close(&mut self, surface: &dyn SurfaceModel, mut at: At, report: &dyn Fn(Stage)) -> Result<(), SurfaceError> {
-        let mut held = None;
+        let mut held: Option<Box<dyn SurfaceModel>> = None;
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
             self.rounds += 1;
             report(Stage::BestOrbit(self.rounds));
@@ -375,7 +375,10 @@ impl Detection {
             if let Some(vsys) = constants.flatten().and_then(|constants| constants.systemic) {
                 at.values.set(Parameter::Vsys, vsys.value_kms);
             }
-            let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
+            let here = match &held {
+                Some(held) => held.linearise(at, Some(self.last()))?,
+                None => surface.with_night_offsets(at, surface.linearise(at, Some(self.last()))?)?,
+            };
             let here = self.known.whole(here, &at.values);
             let mut next = refined(&self.known.beside(&here.quadratic), &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);

@@ -10,6 +10,11 @@ pub fn number_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64,
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
+/// For keys that are left out where they are zero.
+pub fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
 /// Keys of an object that are all present or all absent.
 pub trait Part: DeserializeOwned {
     /// These keys.

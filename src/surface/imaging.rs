@@ -222,9 +222,10 @@ impl Imager {
         self.sets.iter().enumerate().flat_map(|(s, set)| vec![share(s); set.sampling.profiles.len()]).collect()
     }
 
-    /// The RV offsets of nights, of each data set whose profiles share some; for so many coordinates of an expansion,
-    /// of which the velocities of all profiles come first.
-    pub fn night_offsets(&self, coordinates: usize) -> Vec<Common> {
+    /// The RV offsets of nights, of each data set whose profiles share some: of the size that is given for the set, or
+    /// else of this one (km/s). For so many coordinates of an expansion, of which the velocities of all profiles come
+    /// first.
+    pub fn night_offsets(&self, coordinates: usize, unknown_kms: f64) -> Vec<Common> {
         let of_set = |(set, sd_kms): (usize, f64)| {
             self.nights_of(set).into_iter().map(move |night| {
                 let mut of_each = DVector::zeros(coordinates);
@@ -232,8 +233,9 @@ impl Imager {
                 Common { of_each, mean_kms: 0.0, sd_kms }
             })
         };
-        let known = self.night_jitters_kms.iter().enumerate().filter_map(|(set, sd_kms)| Some((set, (*sd_kms)?)));
-        known.filter(|(_, sd_kms)| *sd_kms > 0.0).flat_map(of_set).collect()
+        let size_kms = |set: usize| self.night_jitters_kms.get(set).copied().flatten().unwrap_or(unknown_kms);
+        let sizes = (0..self.sets.len()).map(|set| (set, size_kms(set)));
+        sizes.filter(|(_, sd_kms)| *sd_kms > 0.0).flat_map(of_set).collect()
     }
 
     /// The nights of a data set, by the indices of their profiles.
@@ -296,9 +298,9 @@ impl Imager {
         !self.zero_points.is_empty() || !self.drifts.is_empty()
     }
 
-    /// Whether any velocities are marginalised over beside those of single profiles.
-    pub fn has_shared_velocities(&self) -> bool {
-        self.has_common_velocities() || self.night_jitters_kms.iter().flatten().any(|sd_kms| *sd_kms > 0.0)
+    /// Whether any velocities are marginalised over beside those of single profiles, with night offsets as there.
+    pub fn has_shared_velocities(&self, unknown_kms: f64) -> bool {
+        self.has_common_velocities() || !self.night_offsets(self.profiles().count(), unknown_kms).is_empty()
     }
 
     /// Times (d) of all profiles, and then of all bins of light curves.

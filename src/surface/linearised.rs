@@ -5,6 +5,7 @@ use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
+use crate::numerics::json::is_zero;
 use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of};
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::speeds::with_unit;
@@ -100,6 +101,9 @@ pub struct SpotField {
     pub spot_lifetime_d: Option<f64>,
     /// Velocity jitter (km/s).
     pub velocity_jitter_kms: f64,
+    /// RV offsets of nights, where they are fitted and needed: their standard deviation (km/s).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub night_offsets_kms: f64,
     /// ln Z.
     pub ln_evidence: f64,
     /// Names of those that lie on a bound of the search.
@@ -235,10 +239,14 @@ impl SpotField {
     /// One line of text.
     pub fn line(&self) -> String {
         let jitter = with_unit(self.velocity_jitter_kms);
+        let nights = match self.night_offsets_kms {
+            0.0 => String::new(),
+            kms => format!(", RV offsets of nights {}", with_unit(kms)),
+        };
         let (amplitude, slope, lifetime) = (self.amplitude(), self.slope(), self.lifetime());
         format!(
             "spots (marginalised): amplitude {amplitude}, power-law index {slope} ({}), \
-            lifetime {lifetime}; RV jitter {jitter}\n",
+            lifetime {lifetime}; RV jitter {jitter}{nights}\n",
             self.spectrum()
         )
     }
@@ -321,6 +329,7 @@ mod tests {
             spot_break_degree: 7.0,
             spot_lifetime_d: days,
             velocity_jitter_kms: 0.0,
+            night_offsets_kms: 0.0,
             ln_evidence: 0.0,
             at_bounds,
             errors: FieldErrors::default(),

@@ -69,6 +69,15 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// [`SurfaceError`].
     fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError>;
 
+    /// The star `here`, with its planet, with the most likely RV offsets of nights beside the jitter, where both are
+    /// fitted: they are noise of its velocities. Without a planet in the model offsets would absorb it.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    fn with_night_offsets(&self, _at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
+        Ok(here)
+    }
+
     /// The star `here` with fields of spots that absorb less and more of an orbit, in even steps along a line, where
     /// spots are a field; none otherwise.
     ///

@@ -3,6 +3,7 @@
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::{Parameter, ParameterValues};
+use crate::numerics::json::is_zero;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -71,6 +72,9 @@ pub struct FieldRecord {
     pub spot_break_degree: f64,
     /// RV jitter of the profiles (km/s).
     pub velocity_jitter_kms: f64,
+    /// RV offsets of nights, where they are fitted and needed: their standard deviation (km/s).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub night_offsets_kms: f64,
     /// ln of the evidence.
     pub ln_evidence: f64,
     /// Number of data.
@@ -244,7 +248,15 @@ mod tests {
         let of = |vsini_kms: f64, free: &[&str]| {
             let parameters = BTreeMap::from([("vsini_kms".to_owned(), vsini_kms)]);
             let (spot_break_degree, velocity_jitter_kms, ln_evidence, data) = (7.0, 0.0, 0.0, 1);
-            let record = FieldRecord { parameters, spot_break_degree, velocity_jitter_kms, ln_evidence, data };
+            let night_offsets_kms = 0.0;
+            let record = FieldRecord {
+                parameters,
+                spot_break_degree,
+                velocity_jitter_kms,
+                night_offsets_kms,
+                ln_evidence,
+                data,
+            };
             let record = SurfaceRecord::from(record);
             assert_eq!(record.widening(Parameter::DOmega).is_some(), vsini_kms > FAST_KMS);
             assert_eq!(record.widening(Parameter::K), None);

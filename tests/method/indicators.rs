@@ -34,8 +34,11 @@ fn marginal(scene: &Scene, basis: &Arc<Basis>, lifetime_d: f64) -> Marginal {
     let values = scene.settings.values;
     let design = Arc::new(Design::new(&scene.imager, basis, &values.state()));
     let spectrum = Spectrum { amplitude: 0.2, slope: 0.9, break_degree: 0.0 };
-    let assumed =
-        Assumed { field: Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime_d)) }, jitter_kms: 0.0 };
+    let assumed = Assumed {
+        field: Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime_d)) },
+        jitter_kms: 0.0,
+        night_kms: 0.0,
+    };
     Marginal::new(&scene.imager, basis, design, values, assumed, None).unwrap()
 }
 

@@ -36,7 +36,7 @@ fn scene(config: &Value) -> Scene {
 fn assumed(lifetime_d: f64) -> Assumed {
     let spectrum = Spectrum { amplitude: 0.2, slope: 0.9, break_degree: 0.0 };
     let kernel = Kernel { lifetime: Lifetime::Days(lifetime_d), persistent: 0.1 };
-    Assumed { field: Field { spectrum, kernel }, jitter_kms: 0.0 }
+    Assumed { field: Field { spectrum, kernel }, jitter_kms: 0.0, night_kms: 0.0 }
 }
 
 fn marginal(scene: &Scene, basis: &Arc<Basis>, lifetime_d: f64) -> Marginal {

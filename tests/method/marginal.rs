@@ -165,7 +165,7 @@ fn harmonics_that_no_data_see_change_nothing() {
         let design = Arc::new(Design::new(&scene.imager, basis, &values.state()));
         let spectrum = Spectrum { amplitude, slope, break_degree: 7.0 };
         let field = Field { spectrum, kernel: Kernel::of(Lifetime::Days(days)) };
-        let assumed = Assumed { field, jitter_kms: 0.0 };
+        let assumed = Assumed { field, jitter_kms: 0.0, night_kms: 0.0 };
         Marginal::new(&scene.imager, basis, design, values, assumed, None).unwrap()
     };
     let mut other = values;
@@ -202,7 +202,8 @@ fn posterior(free: &[Parameter]) -> MarginalPosterior {
         },
     };
     let space = scene.space_of(&free.iter().map(|p| wide(*p)).collect::<Vec<_>>());
-    MarginalPosterior::new(scene.imager.clone(), &space, values, Held { break_degree: 0.0, jitter_kms: 0.0 }).unwrap()
+    let held = Held { break_degree: 0.0, jitter_kms: 0.0, night_kms: 0.0 };
+    MarginalPosterior::new(scene.imager.clone(), &space, values, held).unwrap()
 }
 
 const ORBIT: [Parameter; 3] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];

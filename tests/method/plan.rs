@@ -41,7 +41,7 @@ fn planned_information_is_that_of_dense_algebra() {
         kernel: Kernel::of(Lifetime::Days(5.0)),
     };
     for jitter_kms in [0.0, 0.05] {
-        let planned = Planned::new(imager, values, Assumed { field, jitter_kms }, &[], None);
+        let planned = Planned::new(imager, values, Assumed { field, jitter_kms, night_kms: 0.0 }, &[], None);
         for maps in [planned.mean_maps(), planned.drawn_maps(4).unwrap()] {
             let part = vec![0, 1, 3];
             let found = planned.velocities(&maps, std::slice::from_ref(&part)).unwrap().remove(0);
@@ -173,7 +173,7 @@ fn offsets_cost_and_light_curves_add() {
             spectrum: Spectrum { amplitude: 0.15, slope: 0.9, break_degree: 0.0 },
             kernel: Kernel::of(Lifetime::Days(5.0)),
         };
-        let assumed = Assumed { field, jitter_kms: 0.04 };
+        let assumed = Assumed { field, jitter_kms: 0.04, night_kms: 0.0 };
         let planned = Planned::new(&scene.imager, scene.settings.values, assumed, &free, None);
         let all: Vec<usize> = (0..scene.imager.times_of_all_d().len()).collect();
         let part = part.map_or(all, <[usize]>::to_vec);

@@ -88,7 +88,7 @@ impl Detection {
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         remarks.extend(of_choices(robustness, self.blind.best().orbit.delta_ln_l, level));
         remarks.extend(night_offsets.and_then(of_night_offsets));
-        remarks.extend(self.of_offsets_in_k());
+        remarks.extend(self.of_offsets());
         if self.highest().on_edge {
             remarks.push(Remark::against(
                 "P at the edge of the search",
@@ -98,16 +98,16 @@ impl Detection {
         remarks
     }
 
-    /// That the uncertainty of K is without the RV offsets of nights that count in the FAP.
-    fn of_offsets_in_k(&self) -> Option<Remark> {
-        let (night_kms, best) = (self.blind.false_alarm.night_kms, self.blind.best().orbit);
-        let sigma_kms = best.k_kms / (2.0 * best.delta_ln_l).sqrt();
-        (self.is_candidate() && night_kms > 0.0).then(|| {
+    /// The most likely RV offsets of nights without the planet and with it, where the former count in the FAP.
+    fn of_offsets(&self) -> Option<Remark> {
+        let without_kms = self.blind.false_alarm.night_kms;
+        let with_kms = self.at_best.as_ref()?.field.as_ref()?.night_offsets_kms;
+        (self.is_candidate() && without_kms > 0.0).then(|| {
             Remark::note(format!(
-                "Uncertainties of K are without RV offsets of nights. With those of {}, which count in the FAP, σ_K is \
-                about {}: quote that, unless the spectrograph is more stable (observations.night_jitter_kms).",
-                with_unit(night_kms),
-                with_unit(sigma_kms)
+                "Most likely RV offsets of nights: {} without the planet (counted in the FAP), {} with it (counted in \
+                K ± σ_K).",
+                with_unit(without_kms),
+                with_unit(with_kms)
             ))
         })
     }

@@ -30,8 +30,10 @@ pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
 
 /// Standard deviations (km/s) of jitter and nightly offsets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scatter {
+pub struct Scatter {
+    /// Jitter of each profile.
     pub jitter_kms: f64,
+    /// Offsets that the profiles of a night share.
     pub night_kms: f64,
 }
 

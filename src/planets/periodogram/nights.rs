@@ -106,6 +106,19 @@ pub fn beside_offsets(
     (found_kms, scale_kms): (f64, Option<f64>),
     reach: Reach,
 ) -> Option<(Jitters, Offsets)> {
+    let (null, gain) = most_likely(without, nights, (found_kms, scale_kms), reach)?;
+    let offsets = Offsets { sigma_kms: null.night_kms, gain };
+    Some((beside(without, nights, null, (found_kms, scale_kms), reach)?, offsets))
+}
+
+/// The most likely jitter and offsets where these velocities are 0, and by how much the offsets raise ln L, including
+/// their prior; arguments as in [`beside_offsets`]. `None` where zero offsets are the most likely.
+pub fn most_likely(
+    without: &VelocityQuadratic,
+    nights: &Nights,
+    (found_kms, scale_kms): (f64, Option<f64>),
+    reach: Reach,
+) -> Option<(Scatter, f64)> {
     let error_kms = (without.len() as f64 / without.information.trace()).sqrt();
     let (first, last, factor) = OFFSETS;
     let mut sizes = vec![0.0];
@@ -124,10 +137,7 @@ pub fn beside_offsets(
         among.max_by(|a, b| heights[*a].total_cmp(&heights[*b]))
     };
     let (plain, best) = (highest(false)?, highest(true)?);
-    let null = tried[best];
-    let offsets = Offsets { sigma_kms: null.night_kms, gain: heights[best] - heights[plain] };
-    let all = || beside(without, nights, null, (found_kms, scale_kms), reach);
-    if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
+    (tried[best].night_kms > 0.0).then(|| (tried[best], heights[best] - heights[plain]))
 }
 
 /// The same with the offsets found in `of_all` profiles, of which these are a subset.

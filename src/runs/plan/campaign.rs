@@ -359,5 +359,6 @@ fn usual(known: Known) -> Assumed {
         break_degree: known.break_degree(),
     };
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(lifetime_d));
-    Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms: known.jitter_kms.unwrap_or(0.0) }
+    let field = Field { spectrum, kernel: Kernel::of(lifetime) };
+    Assumed { field, jitter_kms: known.jitter_kms.unwrap_or(0.0), night_kms: known.night_kms }
 }

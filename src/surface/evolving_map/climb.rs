@@ -24,7 +24,7 @@ pub(super) const USUAL_BEND: f64 = 100.0;
 const LONGEST: f64 = 0.35;
 
 /// ln amplitude, slope, ln lifetime, ln jitter.
-pub(super) fn place(Assumed { field, jitter_kms }: &Assumed) -> Vector4<f64> {
+pub(super) fn place(Assumed { field, jitter_kms, .. }: &Assumed) -> Vector4<f64> {
     let lifetime_d = match field.kernel.lifetime {
         Lifetime::Days(days) => days,
         Lifetime::Static => f64::INFINITY,
@@ -41,7 +41,7 @@ pub(super) fn assumed_at(place: Vector4<f64>, like: &Assumed) -> Assumed {
         spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1], ..like.field.spectrum },
         kernel: Kernel { lifetime, ..like.field.kernel },
     };
-    Assumed { field, jitter_kms: if like.jitter_kms == 0.0 { 0.0 } else { place[3].exp() } }
+    Assumed { field, jitter_kms: if like.jitter_kms == 0.0 { 0.0 } else { place[3].exp() }, ..*like }
 }
 
 /// Bounds in the coordinates of [`place`].

@@ -13,11 +13,12 @@ use std::sync::Arc;
 
 impl FieldRecord {
     pub(super) fn of(posterior: &MarginalPosterior) -> Self {
-        let Held { break_degree, jitter_kms } = posterior.reference().assumed.held();
+        let Held { break_degree, jitter_kms, night_kms } = posterior.reference().assumed.held();
         FieldRecord {
             parameters: by_name(&posterior.reference().values),
             spot_break_degree: break_degree,
             velocity_jitter_kms: jitter_kms,
+            night_offsets_kms: night_kms,
             ln_evidence: posterior.reference_ln_evidence(),
             data: posterior.imager().data.depth.len(),
         }
@@ -25,7 +26,8 @@ impl FieldRecord {
 
     /// The assumptions that are not parameters.
     pub(super) fn held(&self) -> Held {
-        Held { break_degree: self.spot_break_degree, jitter_kms: self.velocity_jitter_kms }
+        let (jitter_kms, night_kms) = (self.velocity_jitter_kms, self.night_offsets_kms);
+        Held { break_degree: self.spot_break_degree, jitter_kms, night_kms }
     }
 }
 

@@ -54,7 +54,7 @@ impl Marginal {
         let then = |group: &[usize], quadratic: Quadratic| {
             let quadratic = summed(&quadratic, epochs - group.len(), profiles - group.len(), stellar.len());
             let of_others = imager.without(group);
-            let quadratic = with_night_offsets(&of_others, quadratic)?;
+            let quadratic = self.with_night_offsets(&of_others, quadratic)?;
             let others = self.with_zero_points_integrated(&of_others, stellar, quadratic)?;
             Ok(then(&others))
         };
@@ -100,7 +100,7 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn ln_evidence_of_sets(&self, imager: &Imager) -> Result<f64, FieldError> {
-        match imager.has_shared_velocities() {
+        match imager.has_shared_velocities(self.assumed.night_kms) {
             false => Ok(self.ln_evidence()),
             true => Ok(self.expansion(imager, &[])?.log_likelihood),
         }
@@ -125,7 +125,13 @@ impl Marginal {
         let (misfits, slopes) = self.misfits_and_slopes(imager, stellar);
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;
         let quadratic = summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len());
-        with_night_offsets(imager, quadratic)
+        self.with_night_offsets(imager, quadratic)
+    }
+
+    /// RV offsets of nights are noise of the velocities: all results for these are marginalised over them.
+    fn with_night_offsets(&self, imager: &Imager, quadratic: Quadratic) -> Result<Quadratic, FieldError> {
+        let offsets = imager.night_offsets(quadratic.gradient.len(), self.assumed.night_kms);
+        with_integrated(quadratic, &offsets)
     }
 
     fn misfits_and_slopes(&self, imager: &Imager, stellar: &[Parameter]) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
@@ -150,12 +156,6 @@ impl Marginal {
     pub(in crate::surface) fn slopes(&self, imager: &Imager, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
         self.design.slopes(imager, &self.values, &self.brightness(), stellar)
     }
-}
-
-/// RV offsets of nights are noise of the velocities: all results for these are marginalised over them.
-fn with_night_offsets(imager: &Imager, quadratic: Quadratic) -> Result<Quadratic, FieldError> {
-    let offsets = imager.night_offsets(quadratic.gradient.len());
-    with_integrated(quadratic, &offsets)
 }
 
 /// The quadratic marginalised over velocities that profiles have in `common`.

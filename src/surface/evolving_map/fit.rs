@@ -90,7 +90,7 @@ pub(in crate::surface) fn usual(
 ) -> Result<Fitted, FieldError> {
     let spectrum = known.spectrum();
     let kernel = Kernel::of(known.lifetime.unwrap_or(Lifetime::Static));
-    let assumed = Assumed { field: Field { spectrum, kernel }, jitter_kms: known.jitter_kms.unwrap_or(0.0) };
+    let assumed = known.assumed(Field { spectrum, kernel }, 0.0);
     let design = Arc::new(Design::new(imager, basis, &values.state()));
     Ok(Fitted::near(Marginal::new(imager, basis, design, values, assumed, near)?))
 }
@@ -264,7 +264,7 @@ fn starts(known: &Known) -> Vec<Vec<Assumed>> {
     let field = |lifetime: &Lifetime| Field { spectrum, kernel: Kernel::of(*lifetime) };
     let assumed = |lifetime: &Lifetime| {
         let field = field(lifetime);
-        jitters.iter().map(|jitter_kms| Assumed { field, jitter_kms: *jitter_kms }).collect()
+        jitters.iter().map(|jitter_kms| known.assumed(field, *jitter_kms)).collect()
     };
     lifetimes.iter().map(assumed).collect()
 }

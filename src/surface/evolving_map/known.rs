@@ -3,6 +3,7 @@
 use super::{Assumed, Marginal};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, Prior};
+use crate::numerics::json::is_zero;
 use crate::planets::periodogram::ln_prior;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +36,9 @@ pub struct Known {
     pub lifetime: Option<Lifetime>,
     /// Velocity jitter (km/s).
     pub jitter_kms: Option<f64>,
+    /// RV offsets of nights (km/s), in data sets where their size is not given.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub night_kms: f64,
     /// Scale of the half-Cauchy prior of the jitter (km/s), where it is fitted: the stability of the spectrograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jitter_scale_kms: Option<f64>,
@@ -62,7 +66,7 @@ pub struct FieldStart {
 }
 
 impl From<Assumed> for FieldStart {
-    fn from(Assumed { field: Field { spectrum, kernel }, jitter_kms }: Assumed) -> Self {
+    fn from(Assumed { field: Field { spectrum, kernel }, jitter_kms, .. }: Assumed) -> Self {
         FieldStart {
             spot_amplitude: spectrum.amplitude,
             spot_slope: spectrum.slope,
@@ -76,13 +80,14 @@ impl From<Assumed> for FieldStart {
 impl Known {
     /// All values as fitted.
     pub fn of(marginal: &Marginal) -> Self {
-        let Assumed { field, jitter_kms } = marginal.assumed;
+        let Assumed { field, jitter_kms, night_kms } = marginal.assumed;
         Known {
             amplitude: Some(field.spectrum.amplitude),
             slope: Some(field.spectrum.slope),
             break_degree: Some(field.spectrum.break_degree),
             lifetime: Some(field.kernel.lifetime),
             jitter_kms: Some(jitter_kms),
+            night_kms,
             jitter_scale_kms: None,
             priors: [None; 3],
             start: None,
@@ -102,7 +107,12 @@ impl Known {
             None => Lifetime::Days(self.within(2, start.spot_lifetime_d?)),
         };
         let field = Field { spectrum, kernel: Kernel::of(lifetime) };
-        Some(Assumed { field, jitter_kms: self.jitter_kms.unwrap_or(start.velocity_jitter_kms) })
+        Some(self.assumed(field, start.velocity_jitter_kms))
+    }
+
+    /// Such a field with the known noise, with this jitter (km/s) where it is not known.
+    pub(super) fn assumed(&self, field: Field, jitter_kms: f64) -> Assumed {
+        Assumed { field, jitter_kms: self.jitter_kms.unwrap_or(jitter_kms), night_kms: self.night_kms }
     }
 
     /// Degree below which the spectrum is flat at the start of a search: a given slope means a pure power law, unless a

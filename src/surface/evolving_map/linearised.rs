@@ -32,13 +32,14 @@ pub(in crate::surface) fn linearised(
 impl SpotField {
     /// The field of a fit.
     pub(crate) fn of(fitted: &Fitted) -> Self {
-        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
+        let Assumed { field: Field { spectrum, kernel }, jitter_kms, night_kms } = fitted.marginal.assumed;
         SpotField {
             spot_amplitude: spectrum.amplitude,
             spot_slope: spectrum.slope,
             spot_break_degree: spectrum.break_degree,
             spot_lifetime_d: kernel.lifetime.days(),
             velocity_jitter_kms: jitter_kms,
+            night_offsets_kms: night_kms,
             ln_evidence: fitted.ln_evidence,
             at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
             errors: FieldErrors::default(),

@@ -32,7 +32,7 @@ impl Maps {
 }
 
 impl Marginal {
-    /// The same maps, without the jitter as noise of the profiles.
+    /// The same maps, without jitter and RV offsets of nights as noise of the profiles.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -43,7 +43,8 @@ impl Marginal {
         let compression = basis.settling.compression;
         let evidence = Evidence::new(self.assumed.field, &basis.degrees, &epochs, coefficients, compression)?;
         let settled = Settled { evidence, ..self.settled.clone() };
-        Ok(Marginal { assumed: Assumed { jitter_kms: 0.0, ..self.assumed }, settled, ..self.clone() })
+        let assumed = Assumed { jitter_kms: 0.0, night_kms: 0.0, ..self.assumed };
+        Ok(Marginal { assumed, settled, ..self.clone() })
     }
 
     /// Maps at `values`, for a star `nearby` with maps of these coefficients (H, epochs), with the jitter as noise of

@@ -16,6 +16,7 @@
 //! 9. [`fit_indicator`]: the dependence of activity indicators on the spots; indicators in use are epochs, too.
 //! 10. `absorbing`: fields that absorb more of an orbit that is not in the model, for detection limits.
 //! 11. `errors`: the uncertainties of the field.
+//! 12. `noise`: jitter and RV offsets of nights, fitted together.
 
 mod absorbing;
 mod basis;
@@ -36,6 +37,7 @@ mod light;
 pub(in crate::surface) mod linearised;
 mod maps;
 mod nights;
+mod noise;
 mod optimum;
 mod planned;
 mod posterior;
@@ -81,6 +83,8 @@ pub struct Assumed {
     pub field: Field,
     /// RV jitter of the profiles (km/s).
     pub jitter_kms: f64,
+    /// RV offsets of nights (km/s), in data sets where their size is not given.
+    pub night_kms: f64,
 }
 
 /// The assumptions that are not parameters.
@@ -90,20 +94,28 @@ pub struct Held {
     pub break_degree: f64,
     /// RV jitter of the profiles (km/s).
     pub jitter_kms: f64,
+    /// RV offsets of nights (km/s), in data sets where their size is not given.
+    pub night_kms: f64,
 }
 
 impl Assumed {
     /// The field among the parameters, together with the assumptions that are not parameters.
-    pub fn of(values: &ParameterValues, Held { break_degree, jitter_kms }: Held) -> Self {
+    pub fn of(values: &ParameterValues, Held { break_degree, jitter_kms, night_kms }: Held) -> Self {
         let (amplitude, slope) = (values[Parameter::SpotAmplitude], values[Parameter::SpotSlope]);
         let spectrum = Spectrum { amplitude, slope, break_degree };
         let lifetime = values.get(Parameter::SpotLifetime).map_or(Lifetime::Static, Lifetime::Days);
-        Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms }
+        Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms, night_kms }
     }
 
     /// The assumptions that are not parameters.
     pub fn held(&self) -> Held {
-        Held { break_degree: self.field.spectrum.break_degree, jitter_kms: self.jitter_kms }
+        let Assumed { field, jitter_kms, night_kms } = *self;
+        Held { break_degree: field.spectrum.break_degree, jitter_kms, night_kms }
+    }
+
+    /// Whether there is a jitter, or offsets of nights.
+    pub(super) fn has_noise(&self) -> bool {
+        self.jitter_kms > 0.0 || self.night_kms > 0.0
     }
 
     /// `values` with this field among them.

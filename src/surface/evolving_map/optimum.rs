@@ -2,11 +2,14 @@
 //! and the jitter fitted together with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the maximum
 //! of the expansion, or a higher point beyond it, becomes the next point of expansion, until that point converges.
 
-use super::{Basis, Fitted, Forecast, Held, Known, MarginalPosterior, fit};
+use super::linearised::linearised;
+use super::{Basis, Fitted, Forecast, Held, Known, Marginal, MarginalPosterior, fit, noise};
 use crate::field::FieldError;
 use crate::model::{Elements, ParameterSpace, ParameterValues};
 use crate::sampling::log_density::{Evaluation, LogDensity as _};
 use crate::sampling::optimise::{Optimum, climb};
+use crate::surface::At;
+use crate::surface::expansion::nuisances;
 use crate::surface::optimum::{
     Attempt, Best, BlindStart, PEAK_DROP, Progress, REFERENCE_SHIFT, SearchError, Sought, Stage, shift, with_spots_of,
     within,
@@ -124,9 +127,12 @@ fn without_search(sought: Sought, known: Known) -> Result<Start, SearchError> {
     let theta = best.end.clone()?.theta;
     // with the planet in the model the field and the jitter differ
     let with_orbit = first.space().values_at(&theta);
-    Ok(match fit(imager, &basis, with_orbit, known, Some(&fitted)) {
-        Ok(Fitted { marginal, .. }) => {
-            (with_spots_of(space, theta, &marginal.values), marginal.values, marginal.assumed.held())
+    let at = At { imager, values: with_orbit, nuisances: &nuisances(space.free()) };
+    let noisy = |fitted| noise::with_night_offsets(at, linearised(imager, fitted, at.nuisances)?, &known);
+    Ok(match fit(imager, &basis, with_orbit, known, Some(&fitted)).and_then(|fitted| Ok(noisy(fitted)?)) {
+        Ok(here) => {
+            let Marginal { values, assumed, .. } = here.kept::<Fitted>().marginal;
+            (with_spots_of(space, theta, &values), values, assumed.held())
         }
         Err(_) => (theta, field, held),
     })

@@ -72,7 +72,7 @@ impl OtherRotation {
         let height = |period_d: f64, rotations: f64| {
             let lifetime = Lifetime::Days(known.within(2, rotations * period_d));
             let field = Field { spectrum: known.spectrum(), kernel: Kernel::of(lifetime) };
-            let assumed = Assumed { field, jitter_kms: known.jitter_kms.unwrap_or(0.0) };
+            let assumed = known.assumed(field, 0.0);
             let values = turning(period_d);
             let design = Arc::new(Design::new(fewer, &basis, &values.state()));
             Marginal::new(fewer, &basis, design, values, assumed, None).map_or(f64::NEG_INFINITY, |m| m.ln_evidence())

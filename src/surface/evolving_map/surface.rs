@@ -1,10 +1,9 @@
 //! The evolving map behind the interface of all surface models.
 
 use super::linearised::linearised;
-use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, fit, nights, optimum};
+use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, fit, nights, noise, optimum};
 use crate::field::Lifetime;
 use crate::model::{ParameterSpace, ParameterValues};
-use crate::planets::periodogram::nights::Nights;
 use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
@@ -67,25 +66,17 @@ impl SurfaceModel for EvolvingMap {
     }
 
     fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError> {
-        let fitted = here.kept::<Fitted>();
-        let (found_kms, scale_kms) = (fitted.marginal.assumed.jitter_kms, self.known.jitter_scale_kms);
-        if self.known.jitter_kms.is_some() {
-            return Ok(None);
-        }
-        let nights = Nights::new(here.quadratic.len(), &at.imager.nights_of_sets());
-        if found_kms <= 0.0 {
-            return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0, scale_kms, nights }));
-        }
-        let marginal = fitted.marginal.without_jitter(at.imager)?;
-        let without = linearised(at.imager, Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
-        let here = Linearised { field: here.field.clone(), ..without };
-        Ok(Some(WithoutJitter { here, found_kms, scale_kms, nights }))
+        Ok(noise::without(at, here, &self.known)?)
+    }
+
+    fn with_night_offsets(&self, at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
+        Ok(noise::with_night_offsets(at, here, &self.known)?)
     }
 
     fn absorbing(&self, at: At, here: &Linearised) -> Result<Vec<OfField>, SurfaceError> {
         let of_field = |marginal: &Marginal| {
             let marginal = match self.known.jitter_kms {
-                None if marginal.assumed.jitter_kms > 0.0 => marginal.without_jitter(at.imager)?,
+                None if marginal.assumed.has_noise() => marginal.without_jitter(at.imager)?,
                 _ => marginal.clone(),
             };
             let ln_posterior = self.known.height(&marginal);

@@ -364,6 +364,7 @@ impl Settings {
             priors,
             start: None,
             jitter_kms: self.velocity_jitter.number(),
+            night_kms: 0.0,
             jitter_scale_kms: self.stability_kms.map(|scale| scale.max(BEST_STABILITY_KMS)),
         }
     }

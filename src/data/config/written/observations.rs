@@ -6,6 +6,7 @@ use super::number_or::{Automatic, OfStar, VelocityJitter, ZeroPoint};
 use super::per_parameter::PerParameter;
 use super::star::{LimbDarkeningSection, Line, RegionsSection};
 use crate::data::simulate::{RandomSpots, Schedule};
+use crate::numerics::json::is_zero;
 use crate::surface::calibration::noise::Weights;
 use crate::surface::nuisances::LineAndContinuum;
 use schemars::JsonSchema;
@@ -195,10 +196,6 @@ pub struct SimulateSection {
     /// inference may be wrong.
     #[serde(default)]
     pub truth: PerParameter<f64>,
-}
-
-fn is_zero(x: &f64) -> bool {
-    *x == 0.0
 }
 
 pub(super) fn one() -> f64 {
