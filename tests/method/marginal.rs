@@ -2,6 +2,7 @@
 
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
+use dimcmc::internals::inference::search::find;
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
 use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Design, Held, Maps, Marginal, MarginalPosterior, fit};
@@ -100,6 +101,33 @@ fn a_planet_of_a_star_without_spots_is_found() {
     assert!(verdict.false_alarm_probability.unwrap() < 1e-4, "{}", verdict.sentence);
     assert!(remarks.iter().any(|r| r.text.contains("The profiles show no spots")), "{remarks:?}");
     assert!(remarks.iter().all(|r| !r.text.contains("chi2")), "{remarks:?}");
+}
+
+/// Search and chain have one noise: the offsets of nights that are left beside the best orbit. A star without offsets
+/// has none, though without its planet they would absorb it.
+#[test]
+fn offsets_of_nights_are_noise_of_the_orbit_in_search_and_chain() {
+    let found = |offset_kms: f64| {
+        let (mut scene, ..) = star("static-planet", 600);
+        for (night, profiles) in scene.imager.nights_of_sets().into_iter().enumerate() {
+            // without a pattern that an orbit has
+            let off = offset_kms * (2.0 * (night as f64 * 0.414_213_562).fract() - 1.0) * 3f64.sqrt();
+            profiles.iter().for_each(|k| scene.imager.sets[0].sampling.profiles[*k].1 -= off);
+        }
+        let found = find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()).unwrap();
+        let detection = found.detection.unwrap();
+        let of_search = detection.last().field.as_ref().unwrap().night_offsets_kms;
+        let sigmas = [detection.best.orbit.sigma_k_kms, found.optimum.written_covariance[(0, 0)].sqrt()];
+        // as run.json has it: absent for 0
+        let record = serde_json::to_value(found.posterior.record()).unwrap();
+        let of_chain = record.get("night_offsets_kms").map_or(0.0, |kms| kms.as_f64().unwrap());
+        (detection.blind.false_alarm.night_kms, of_search, of_chain, sigmas)
+    };
+    let (without, none, of_chain, [plain, _]) = found(0.0);
+    assert!(without > 0.05 && none == 0.0 && of_chain == 0.0, "{without} {none} {of_chain}");
+    let (_, offsets, of_chain, [searched, sampled]) = found(0.05);
+    assert!((0.03..0.06).contains(&offsets) && offsets == of_chain, "{offsets} {of_chain}");
+    assert!(searched > 1.5 * plain && (sampled / searched - 1.0).abs() < 0.05, "{plain} {searched} {sampled}");
 }
 
 /// The prior of the field is also used where it is fitted.

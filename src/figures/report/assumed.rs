@@ -69,7 +69,7 @@ pub(super) fn fixed(config: &Value) -> Table {
         if *pointer == NIGHTS && are_nights_fitted(config) {
             let stability_kms = config.pointer("/instrument/stability_ms").and_then(Value::as_f64).map(|x| x / 1e3);
             let most = with_unit(most_offset_kms(stability_kms));
-            let text = format!("up to {most} in the FAP, where nights of several profiles show them; none in K");
+            let text = format!("fitted where nights of several profiles show them, up to {most}");
             return Some(vec![(*name).to_owned(), text]);
         }
         let value = config.pointer(pointer).filter(|value| !value.is_null() && !is_free(pointer) && !is_idle)?;
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!([&rows[0][2], &rows[1][2]], ["3.60 ± 1.44 km/s", "value from the mean profile ± 15 %"]);
         assert_eq!(rows.len(), 2 + Parameter::REGIONS.len() - 1, "{rows:?}");
         let nights = |config: &Value| fixed(config).rows.into_iter().find(|row| row[0].contains("nights"));
-        assert!(nights(&config).unwrap()[1].starts_with("up to 60 m/s in the FAP"));
+        assert!(nights(&config).unwrap()[1].ends_with("up to 60 m/s"));
         config["observations"] = json!({ "night_jitter_kms": 0.0 });
         assert_eq!(nights(&config).unwrap()[1], "0 km/s");
         for held in [json!({ "velocity_jitter_kms": 0.0 }), json!([{ "night_jitter_kms": 0.01 }, {}])] {

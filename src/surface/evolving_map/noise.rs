@@ -6,8 +6,10 @@
 use super::linearised::linearised;
 use super::{Assumed, Fitted, Known, Marginal};
 use crate::field::FieldError;
+use crate::model::Parameter;
 use crate::planets::periodogram::Scatter;
 use crate::planets::periodogram::nights::{Nights, Reach, most_likely};
+use crate::planets::periodogram::two_planets::without as without_orbit;
 use crate::surface::{At, Linearised, WithoutJitter};
 use std::sync::Arc;
 
@@ -35,9 +37,11 @@ pub(super) fn with_night_offsets(at: At, here: Linearised, known: &Known) -> Res
     else {
         return Ok(here);
     };
-    // around its planet
-    let (mut velocities, orbit) = (without.quadratic.clone(), at.values.motion().first);
+    // marginalised over its orbit: with the best one too little would be left
+    let orbit = at.values.motion().first;
+    let mut velocities = without.quadratic.clone();
     velocities.count_in(|cycle| -orbit.velocity_kms(cycle));
+    let velocities = without_orbit(&velocities, 1.0 / at.values[Parameter::PorbOverProt]).unwrap_or(velocities);
     let found = most_likely(&velocities, &nights, (found_kms, scale_kms), Reach::Stable);
     let Some((Scatter { jitter_kms, night_kms }, _)) = found else { return Ok(here) };
     let Fitted { marginal, at_bounds, hessian, .. } = here.kept::<Fitted>();

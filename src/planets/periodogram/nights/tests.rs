@@ -120,6 +120,30 @@ fn a_planet_is_no_offset_of_nights() {
     }
 }
 
+/// Around the planet they are the star's own: without it in the model they absorb it.
+#[test]
+fn offsets_beside_a_planet_do_not_absorb_it() {
+    let most_kms = Reach::Stable.most_kms(None);
+    let beside = |night_kms: f64, seed: u64| {
+        let (mut velocities, nights) = of(0.0, night_kms, 0.15, seed);
+        let of = |velocities: &VelocityQuadratic| {
+            most_likely(velocities, &nights, (0.1, None), Reach::Stable).map_or(0.0, |(scatter, _)| scatter.night_kms)
+        };
+        let without = of(&velocities);
+        let planet = sample::orbit(&velocities.cycles, -0.15, 1.7, 0.3);
+        velocities.gradient += &velocities.information * planet;
+        (without, of(&velocities))
+    };
+    let median = |night_kms: f64| {
+        let mut all: Vec<f64> = (0..9).map(|seed| beside(night_kms, seed).1).collect();
+        all.sort_by(f64::total_cmp);
+        all[4]
+    };
+    assert!((0..9).all(|seed| beside(0.0, seed).0 == most_kms), "they absorb it");
+    let (none, some) = (median(0.0), median(0.045));
+    assert!(none < 0.01 && (0.03..0.06).contains(&some), "{none} {some}");
+}
+
 /// Without a night in the middle its offset is left without a profile.
 #[test]
 fn profiles_that_are_left_keep_their_nights() {
