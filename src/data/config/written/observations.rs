@@ -60,7 +60,7 @@ pub struct ObservationsSection {
     pub velocity_jitter_kms: Option<VelocityJitter>,
     /// RV offset that all profiles of one night share: its standard deviation from night to night (km/s), such as the
     /// scatter of nightly means of an RV standard. Marginalised over with objective "marginal-likelihood". If not
-    /// given, searches and limits with a fitted RV jitter fit such offsets up to twice the stability of the
+    /// given, searches, chains and limits with a fitted RV jitter fit such offsets up to twice the stability of the
     /// spectrograph, and a candidate or known planet that is not significant beside larger ones has a caveat.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub night_jitter_kms: Option<f64>,
