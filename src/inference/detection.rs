@@ -202,7 +202,8 @@ impl PlanetFree {
         let known = KnownPlanets::absent(&settings.known, &here, without_jitter.as_ref());
         known.write(&mut at.values);
         let here = known.whole(surface.linearise(at, Some(&here))?, &at.values);
-        let known = known.present(&here.quadratic);
+        let with_known = surface.without_jitter(at, &here)?;
+        let known = known.clone().present(&known.noisy(&here, with_known.as_ref(), &at.values));
         let found = PlanetFree::of(surface, at, (here, known), frequencies, settings.search, report)?;
         Ok(PlanetFree { alone: Some(Alone { jitters, without_jitter }), ..found })
     }
@@ -275,7 +276,9 @@ impl Detection {
         // K of the known planets with the detected planet in the model
         if !found.known.planets.is_empty() && found.is_candidate() && found.known.companion.is_none() {
             let frequency = 1.0 / found.blind.best().porb_over_prot;
-            found.known = found.known.with_companion(frequency, &found.planet_free.quadratic);
+            let known = found.known.with_companion(frequency);
+            let noisy = known.noisy(&found.planet_free, found.without_jitter.as_ref(), &at.values);
+            found.known = known.clone().present(&noisy);
         }
         match found.known.first().map(KnownPlanet::peak) {
             // the star without another planet is imaged with its orbit
@@ -377,7 +380,7 @@ impl Detection {
             }
             let here = match &held {
                 Some(held) => held.linearise(at, Some(self.last()))?,
-                None => surface.with_night_offsets(at, surface.linearise(at, Some(self.last()))?)?,
+                None => self.noisy(surface, at, surface.linearise(at, Some(self.last()))?)?,
             };
             let here = self.known.whole(here, &at.values);
             let mut next = refined(&self.known.beside(&here.quadratic), &self.frequencies, &self.best);
@@ -392,6 +395,21 @@ impl Detection {
         // one height whatever the spots: the one compared with stars without a planet
         self.best.orbit.delta_ln_l = self.blind.best().orbit.delta_ln_l;
         Ok(())
+    }
+
+    /// The star `here`, with the best orbit, with the most likely RV offsets of nights beside an orbit of that period, if
+    /// any are needed: without the planet in the model they would absorb it.
+    fn noisy(&self, surface: &dyn SurfaceModel, at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
+        if self.without_jitter.as_ref().is_none_or(|star| star.nights.is_none()) {
+            return Ok(here);
+        }
+        let noise = surface.without_jitter(at, &here)?.and_then(|star| {
+            let velocities = self.known.beside(&star.here.quadratic);
+            star.noise(&without(&velocities, 1.0 / self.best.porb_over_prot)?)
+        });
+        let needed = noise.filter(|noise| noise.night_kms > 0.0);
+        let noisy = needed.and_then(|noise| surface.with_noise(at, &here, noise).ok());
+        Ok(noisy.unwrap_or(here))
     }
 
     /// The Keplerian orbits of all peaks.
@@ -415,7 +433,14 @@ impl Detection {
         let Some(rest) = without(&self.known.beside(quadratic), 1.0 / first.porb_over_prot) else { return Ok(None) };
         let jitters = star.as_ref().map_or_else(|| Jitters::none(&rest), |star| star.beside(&rest));
         let search = imitated(surface, Search::with_jitter(&jitters, &self.frequencies, settings)?);
-        let both = both(&self.known.beside(&here.quadratic), &self.frequencies, first, search.best());
+        // offsets of nights found beside the first orbit alone would absorb the second
+        let has_offsets = here.field.as_ref().is_some_and(|field| field.night_offsets_kms > 0.0);
+        let noisy = star.as_ref().filter(|_| has_offsets).and_then(|star| {
+            let free = without(&rest, 1.0 / search.best().porb_over_prot)?;
+            star.with_noise(&star.here.quadratic, star.noise(&free)?)
+        });
+        let quadratic = noisy.as_ref().unwrap_or(&here.quadratic);
+        let both = both(&self.known.beside(quadratic), &self.frequencies, first, search.best());
         Ok(Some(SecondPlanet { search, both }))
     }
 }

@@ -300,7 +300,8 @@ impl Imager {
 
     /// Whether any velocities are marginalised over beside those of single profiles, with night offsets as there.
     pub fn has_shared_velocities(&self, unknown_kms: f64) -> bool {
-        self.has_common_velocities() || !self.night_offsets(self.profiles().count(), unknown_kms).is_empty()
+        let size_kms = |set: usize| self.night_jitters_kms.get(set).copied().flatten().unwrap_or(unknown_kms);
+        self.has_common_velocities() || (0..self.sets.len()).any(|set| size_kms(set) > 0.0)
     }
 
     /// Times (d) of all profiles, and then of all bins of light curves.

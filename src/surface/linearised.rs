@@ -6,8 +6,8 @@ use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
 use crate::numerics::json::is_zero;
-use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of};
-use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
+use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of, most_likely, with_noise};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Scatter, Unbounded};
 use crate::planets::speeds::with_unit;
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::{Remark, decimals};
@@ -50,12 +50,12 @@ impl Linearised {
     }
 }
 
-/// A star without its RV jitter, which the profiles constrain.
+/// A star without its RV jitter and RV offsets of nights, which the profiles constrain.
 #[derive(Clone, Debug)]
 pub struct WithoutJitter {
-    /// The star with its spots, without a jitter.
+    /// The star with its spots, without jitter and offsets.
     pub here: Linearised,
-    /// The jitter that was found (km/s); 0 where none is needed.
+    /// The jitter that was found, with the offsets in quadrature (km/s); 0 where none is needed.
     pub found_kms: f64,
     /// Scale of its prior (km/s), where it has one.
     pub scale_kms: Option<f64>,
@@ -76,6 +76,17 @@ impl WithoutJitter {
         let nights = self.nights.as_ref().map(|nights| nights.of(&quadratic.cycles, &self.here.quadratic.cycles));
         let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, (self.found_kms, self.scale_kms));
         nights.and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
+    }
+
+    /// The most likely jitter and night offsets of these velocities of this star, in which orbits are left free.
+    pub fn noise(&self, velocities: &VelocityQuadratic) -> Option<Scatter> {
+        let found = most_likely(velocities, self.nights.as_ref()?, (self.found_kms, self.scale_kms), Reach::Stable);
+        found.map(|(noise, _)| noise)
+    }
+
+    /// The likelihood of these velocities of this star with that noise.
+    pub fn with_noise(&self, velocities: &VelocityQuadratic, noise: Scatter) -> Option<VelocityQuadratic> {
+        with_noise(velocities, self.nights.as_ref()?, noise)
     }
 
     /// With jitters of several sizes only.

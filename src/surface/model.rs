@@ -9,7 +9,7 @@ use super::{
     AtTarget, Change, Explained, FieldErrors, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps, WithoutJitter,
 };
 use crate::model::{ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField, Scatter};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -62,20 +62,19 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// the data: unresolved spots count as noise of the size that the gradient implies.
     fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic>;
 
-    /// The star `here` without its RV jitter, where the profiles are to constrain it; `None` where it is given, or
-    /// there is none.
+    /// The star `here` without its RV jitter and RV offsets of nights, where the profiles are to constrain the jitter;
+    /// `None` where it is given, or there is none.
     ///
     /// # Errors
     /// [`SurfaceError`].
     fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError>;
 
-    /// The star `here`, with its planet, with the most likely RV offsets of nights beside the jitter, where both are
-    /// fitted: they are noise of its velocities. Without a planet in the model offsets would absorb it.
+    /// The star `here` with this jitter and these RV offsets of nights as noise of its velocities, where it has such.
     ///
     /// # Errors
     /// [`SurfaceError`].
-    fn with_night_offsets(&self, _at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
-        Ok(here)
+    fn with_noise(&self, _at: At, here: &Linearised, _noise: Scatter) -> Result<Linearised, SurfaceError> {
+        Ok(here.clone())
     }
 
     /// The star `here` with fields of spots that absorb less and more of an orbit, in even steps along a line, where

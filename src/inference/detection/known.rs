@@ -85,16 +85,34 @@ impl KnownPlanets {
         KnownPlanets { planets: ephemerides.iter().zip(&absent).map(planet).collect(), companion: None, absent }
     }
 
-    /// The same where another planet was detected at that frequency (orbits a rotation cycle): K of each, alone and by
-    /// the velocities of the star with them, with its orbit free.
+    /// The same where another planet was detected at that frequency (orbits a rotation cycle): K of each, alone, with its
+    /// orbit free.
     #[must_use]
-    pub fn with_companion(mut self, frequency: f64, quadratic: &VelocityQuadratic) -> Self {
+    pub fn with_companion(mut self, frequency: f64) -> Self {
         self.companion = Some(frequency);
         for (planet, rest) in self.planets.iter_mut().zip(&self.absent) {
             let rest = without(rest, frequency).unwrap_or_else(|| rest.clone());
             planet.alone = rest.amplitude(&planet.ephemeris.unit_velocities(&rest.cycles));
         }
-        self.present(quadratic)
+        self
+    }
+
+    /// Velocities of the star `here` with them, at `values`, with the RV offsets of nights that are the most likely
+    /// beside them, if any are needed.
+    pub fn noisy<'a>(
+        &self,
+        here: &'a Linearised,
+        without_jitter: Option<&WithoutJitter>,
+        values: &ParameterValues,
+    ) -> Cow<'a, VelocityQuadratic> {
+        let noisy = without_jitter.filter(|star| star.nights.is_some()).and_then(|star| {
+            let velocities = self.whole(star.here.clone(), values).quadratic;
+            let rest = self.beside(&velocities);
+            let beside_companion = self.companion.and_then(|at| without(&rest, at));
+            let noise = star.noise(beside_companion.as_ref().unwrap_or(&rest))?;
+            star.with_noise(&velocities, noise).filter(|_| noise.night_kms > 0.0)
+        });
+        noisy.map_or(Cow::Borrowed(&here.quadratic), Cow::Owned)
     }
 
     /// Writes their orbits into `values`, with K measured on a star without them.
@@ -356,7 +374,7 @@ mod tests {
         let quadratic = quadratic(&[(b, 0.06), (c, 0.3)]);
         let known = KnownPlanets::of(&[b], |_| quadratic.clone()).present(&quadratic);
         let off = |known: &KnownPlanets| (known.planets[0].k.unwrap().moments[0] - 0.06).abs();
-        let beside = known.clone().with_companion(2.0 / 9.1, &quadratic);
+        let beside = known.clone().with_companion(2.0 / 9.1).present(&quadratic);
         assert!(off(&known) > 1e-3 && off(&beside) < 1e-9, "{} {}", off(&known), off(&beside));
         assert!((beside.planets[0].alone[0] - 0.06).abs() < 1e-9);
     }

@@ -98,11 +98,11 @@ impl Detection {
         remarks
     }
 
-    /// The most likely RV offsets of nights without the planet and with it, where the former count in the FAP.
+    /// The most likely RV offsets of nights without the planet and with it, where there are any.
     fn of_offsets(&self) -> Option<Remark> {
         let without_kms = self.blind.false_alarm.night_kms;
         let with_kms = self.at_best.as_ref()?.field.as_ref()?.night_offsets_kms;
-        (self.is_candidate() && without_kms > 0.0).then(|| {
+        (self.is_candidate() && (without_kms > 0.0 || with_kms > 0.0)).then(|| {
             Remark::note(format!(
                 "Most likely RV offsets of nights: {} without the planet (counted in the FAP), {} with it (counted in \
                 K ± σ_K).",

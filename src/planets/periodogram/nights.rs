@@ -108,11 +108,12 @@ pub fn beside_offsets(
 ) -> Option<(Jitters, Offsets)> {
     let (null, gain) = most_likely(without, nights, (found_kms, scale_kms), reach)?;
     let offsets = Offsets { sigma_kms: null.night_kms, gain };
-    Some((beside(without, nights, null, (found_kms, scale_kms), reach)?, offsets))
+    let all = || beside(without, nights, null, (found_kms, scale_kms), reach);
+    if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
 }
 
 /// The most likely jitter and offsets where these velocities are 0, and by how much the offsets raise ln L, including
-/// their prior; arguments as in [`beside_offsets`]. `None` where zero offsets are the most likely.
+/// their prior; arguments as in [`beside_offsets`].
 pub fn most_likely(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -137,7 +138,7 @@ pub fn most_likely(
         among.max_by(|a, b| heights[*a].total_cmp(&heights[*b]))
     };
     let (plain, best) = (highest(false)?, highest(true)?);
-    (tried[best].night_kms > 0.0).then(|| (tried[best], heights[best] - heights[plain]))
+    Some((tried[best], heights[best] - heights[plain]))
 }
 
 /// The same with the offsets found in `of_all` profiles, of which these are a subset.
@@ -166,6 +167,11 @@ pub(super) fn beside(
     let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
     let (levels, covariance) = levels(without, &of(null)?, all?);
     Some(Jitters { levels, ln_shares: shares.collect(), null: Some(null), covariance })
+}
+
+/// The likelihood of the velocities with this noise, a jitter and offsets of `nights`.
+pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) -> Option<VelocityQuadratic> {
+    Some(Beside::new(without, nights, noise, (None, Reach::Stable))?.likelihood(without))
 }
 
 /// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).

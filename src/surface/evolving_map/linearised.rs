@@ -17,6 +17,10 @@ pub(in crate::surface) fn linearised(
     let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
     let [expansion, held] = fitted.marginal.expansions(imager, &stellar)?;
     let quadratic = expansion.velocities(nuisances);
+    let fitted = match fitted.marginal.assumed.night_kms {
+        0.0 => fitted,
+        _ => Fitted { ln_evidence: held.log_likelihood, ..fitted },
+    };
     Ok(Linearised {
         expansion,
         held: held.velocities(&of_the_star(nuisances)),

@@ -92,7 +92,7 @@ impl SurfaceMaps {
         Ok(SurfaceMaps {
             maps: times_d.iter().enumerate().map(map).collect(),
             nuisances: counted(nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect(),
-            zero_points_kms: counted(marginal.assumed.jitter_kms > 0.0).map(|found| found.zero_point_kms).collect(),
+            zero_points_kms: counted(marginal.assumed.has_noise()).map(|found| found.zero_point_kms).collect(),
             light,
             readings: marginal.readings(imager),
             trade_off: Vec::new(),
@@ -192,7 +192,8 @@ impl Modelled {
         let shares = imager.jitter_share_of_each();
         let slopes = marginal.slopes(imager, &[]).into_iter().zip(&shares);
         let slopes: Vec<f64> = slopes.flat_map(|(slopes, share)| (slopes * *share).as_slice().to_vec()).collect();
-        let with_jitter = imager.clone().with_zero_points(marginal.assumed.jitter_kms, &slopes);
+        let Assumed { jitter_kms, night_kms, .. } = marginal.assumed;
+        let with_jitter = imager.clone().with_zero_points(jitter_kms.hypot(night_kms), &slopes);
         let bins: Vec<_> = (0..response.profiles()).map(|k| response.bins(k)).collect();
         let residual: Vec<f64> = depth.iter().zip(&imager.data.depth).map(|(model, data)| model - data).collect();
         let mut weighted = vec![0.0; residual.len()];

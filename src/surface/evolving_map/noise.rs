@@ -6,9 +6,9 @@
 use super::linearised::linearised;
 use super::{Assumed, Fitted, Known, Marginal};
 use crate::field::FieldError;
-use crate::model::Parameter;
+use crate::model::{Elements, ParameterSpace};
 use crate::planets::periodogram::Scatter;
-use crate::planets::periodogram::nights::{Nights, Reach, most_likely};
+use crate::planets::periodogram::nights::Nights;
 use crate::planets::periodogram::two_planets::without as without_orbit;
 use crate::surface::{At, Linearised, WithoutJitter};
 use std::sync::Arc;
@@ -31,23 +31,31 @@ pub(super) fn without(at: At, here: &Linearised, known: &Known) -> Result<Option
     Ok(Some(WithoutJitter { here, found_kms, scale_kms, nights }))
 }
 
-/// The star `here` with the most likely jitter and offsets, where they are to be fitted and offsets are needed.
-pub(super) fn with_night_offsets(at: At, here: Linearised, known: &Known) -> Result<Linearised, FieldError> {
-    let Some(WithoutJitter { here: without, found_kms, scale_kms, nights: Some(nights) }) = without(at, &here, known)?
-    else {
-        return Ok(here);
-    };
-    // marginalised over its orbit: with the best one too little would be left
-    let orbit = at.values.motion().first;
-    let mut velocities = without.quadratic.clone();
-    velocities.count_in(|cycle| -orbit.velocity_kms(cycle));
-    let velocities = without_orbit(&velocities, 1.0 / at.values[Parameter::PorbOverProt]).unwrap_or(velocities);
-    let found = most_likely(&velocities, &nights, (found_kms, scale_kms), Reach::Stable);
-    let Some((Scatter { jitter_kms, night_kms }, _)) = found else { return Ok(here) };
+/// The star `here` with this noise.
+pub(super) fn with(at: At, here: &Linearised, noise: Scatter) -> Result<Linearised, FieldError> {
+    let Scatter { jitter_kms, night_kms } = noise;
     let Fitted { marginal, at_bounds, hessian, .. } = here.kept::<Fitted>();
     let assumed = Assumed { jitter_kms, night_kms, ..marginal.assumed };
-    let (basis, design) = (&marginal.basis, Arc::clone(&marginal.design));
-    let marginal = Marginal::new(at.imager, basis, design, marginal.values, assumed, Some(marginal))?;
+    let anew = |near: Option<&Marginal>| {
+        let (basis, design) = (&marginal.basis, Arc::clone(&marginal.design));
+        Marginal::new(at.imager, basis, design, marginal.values, assumed, near)
+    };
+    let marginal = anew(Some(marginal)).or_else(|_| anew(None))?;
     let fitted = Fitted { at_bounds: at_bounds.clone(), hessian: *hessian, ..Fitted::near(marginal) };
     linearised(at.imager, fitted, at.nuisances)
+}
+
+/// The most likely noise of the star `here`, beside its orbits, where there may be offsets of nights; amplitudes of
+/// orbits with a free K are marginalised over: with the best ones too little would be left.
+pub(super) fn beside_orbits(at: At, here: &Linearised, known: &Known, space: &ParameterSpace) -> Option<Scatter> {
+    Nights::new(here.quadratic.len(), &at.imager.nights_of_sets())?;
+    let star = without(at, here, known).ok()??;
+    let is_free = |of: &&Elements| space.free().iter().any(|free| free.parameter == of.k);
+    let orbit = at.values.motion().first;
+    let mut velocities = star.here.quadratic.clone();
+    velocities.count_in(|cycle| -orbit.velocity_kms(cycle));
+    for ratio in Elements::PLANETS.iter().filter(is_free).filter_map(|of| at.values.get(of.ratio)) {
+        velocities = without_orbit(&velocities, 1.0 / ratio).unwrap_or(velocities);
+    }
+    star.noise(&velocities)
 }

@@ -1,11 +1,12 @@
 //! The search for the best parameters with an evolving map: it begins at the orbit of a blind search, with the field
-//! and the jitter fitted together with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the maximum
+//! and the noise fitted together with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the maximum
 //! of the expansion, or a higher point beyond it, becomes the next point of expansion, until that point converges.
 
 use super::linearised::linearised;
-use super::{Basis, Fitted, Forecast, Held, Known, Marginal, MarginalPosterior, fit, noise};
+use super::{Basis, Design, Fitted, Forecast, Held, Known, Marginal, MarginalPosterior, fit, noise};
 use crate::field::FieldError;
 use crate::model::{Elements, ParameterSpace, ParameterValues};
+use crate::planets::periodogram::Scatter;
 use crate::sampling::log_density::{Evaluation, LogDensity as _};
 use crate::sampling::optimise::{Optimum, climb};
 use crate::surface::At;
@@ -39,7 +40,7 @@ pub(super) fn find(
     let at = |stage| report(Progress { stage, evaluations: 0 });
     at(Stage::FirstImage);
     let (mut theta, field, held) = match start {
-        Some(BlindStart { theta, values, here }) => (theta, values, here.kept::<Fitted>().marginal.assumed.held()),
+        Some(start) => from_search(sought, known, start),
         None => without_search(sought, known)?,
     };
     let mut highest: Option<(Arc<MarginalPosterior>, Optimum)> = None;
@@ -109,8 +110,37 @@ fn on_the_way(space: &ParameterSpace, from: &[f64], to: &[f64], share: f64) -> V
     space.to_physical(&a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect::<Vec<_>>())
 }
 
-/// The start: vector, field and jitter.
+/// The start: vector, field and noise.
 type Start = (Vec<f64>, ParameterValues, Held);
+
+/// At the orbit of a blind search. Its offsets of nights are those beside one circular orbit: another planet, or an
+/// eccentricity, would be among them.
+fn from_search(sought: Sought, known: Known, BlindStart { theta, values, here }: BlindStart) -> Start {
+    let (imager, space) = (sought.imager, sought.space);
+    let Fitted { marginal, .. } = here.kept();
+    let all = space.clone().with_field_of(&values).values_at(&theta);
+    let held = marginal.assumed.held();
+    if held.night_kms == 0.0 || (all.second.is_none() && all.first.shape.is_none()) {
+        return (theta, values, held);
+    }
+    let design = Arc::new(Design::new(imager, &marginal.basis, &all.state()));
+    let there = Marginal::new(imager, &marginal.basis, design, all, marginal.assumed, Some(marginal));
+    let held = there.map_or(held, |there| beside_orbits(sought, known, Fitted::near(there)));
+    (theta, values, held)
+}
+
+/// What is held of a fit, with the most likely offsets of nights beside its orbits.
+fn beside_orbits(Sought { imager, space, .. }: Sought, known: Known, fitted: Fitted) -> Held {
+    let (values, held) = (fitted.marginal.values, fitted.marginal.assumed.held());
+    let at = At { imager, values, nuisances: &nuisances(space.free()) };
+    let here = linearised(imager, fitted, at.nuisances).ok();
+    match here.and_then(|here| noise::beside_orbits(at, &here, &known, space)) {
+        Some(Scatter { jitter_kms, night_kms }) if night_kms > 0.0 || held.night_kms > 0.0 => {
+            Held { jitter_kms, night_kms, ..held }
+        }
+        _ => held,
+    }
+}
 
 /// The highest of the maxima of the expansion around the star without a planet, with the field fitted again there.
 fn without_search(sought: Sought, known: Known) -> Result<Start, SearchError> {
@@ -127,12 +157,10 @@ fn without_search(sought: Sought, known: Known) -> Result<Start, SearchError> {
     let theta = best.end.clone()?.theta;
     // with the planet in the model the field and the jitter differ
     let with_orbit = first.space().values_at(&theta);
-    let at = At { imager, values: with_orbit, nuisances: &nuisances(space.free()) };
-    let noisy = |fitted| noise::with_night_offsets(at, linearised(imager, fitted, at.nuisances)?, &known);
-    Ok(match fit(imager, &basis, with_orbit, known, Some(&fitted)).and_then(|fitted| Ok(noisy(fitted)?)) {
-        Ok(here) => {
-            let Marginal { values, assumed, .. } = here.kept::<Fitted>().marginal;
-            (with_spots_of(space, theta, &values), values, assumed.held())
+    Ok(match fit(imager, &basis, with_orbit, known, Some(&fitted)) {
+        Ok(fitted) => {
+            let (values, held) = (fitted.marginal.values, beside_orbits(sought, known, fitted));
+            (with_spots_of(space, theta, &values), values, held)
         }
         Err(_) => (theta, field, held),
     })

@@ -4,7 +4,7 @@ use super::linearised::linearised;
 use super::{Basis, Change, Fitted, Known, Marginal, MarginalPosterior, NoFit, fit, nights, noise, optimum};
 use crate::field::Lifetime;
 use crate::model::{ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, OfField, Scatter};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -69,8 +69,8 @@ impl SurfaceModel for EvolvingMap {
         Ok(noise::without(at, here, &self.known)?)
     }
 
-    fn with_night_offsets(&self, at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
-        Ok(noise::with_night_offsets(at, here, &self.known)?)
+    fn with_noise(&self, at: At, here: &Linearised, noise: Scatter) -> Result<Linearised, SurfaceError> {
+        Ok(noise::with(at, here, noise)?)
     }
 
     fn absorbing(&self, at: At, here: &Linearised) -> Result<Vec<OfField>, SurfaceError> {
