@@ -397,8 +397,8 @@ impl Detection {
         Ok(())
     }
 
-    /// The star `here`, with the best orbit, with the most likely RV offsets of nights beside an orbit of that period, if
-    /// any are needed: without the planet in the model they would absorb it.
+    /// The star `here`, with the best orbit, with the most likely RV offsets of nights beside an orbit of that period,
+    /// if any are needed: without the planet in the model they would absorb it.
     fn noisy(&self, surface: &dyn SurfaceModel, at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
         if self.without_jitter.as_ref().is_none_or(|star| star.nights.is_none()) {
             return Ok(here);

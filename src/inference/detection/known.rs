@@ -85,8 +85,8 @@ impl KnownPlanets {
         KnownPlanets { planets: ephemerides.iter().zip(&absent).map(planet).collect(), companion: None, absent }
     }
 
-    /// The same where another planet was detected at that frequency (orbits a rotation cycle): K of each, alone, with its
-    /// orbit free.
+    /// The same where another planet was detected at that frequency (orbits a rotation cycle): K of each, alone, with
+    /// its orbit free.
     #[must_use]
     pub fn with_companion(mut self, frequency: f64) -> Self {
         self.companion = Some(frequency);
