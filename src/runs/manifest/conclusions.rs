@@ -160,7 +160,10 @@ impl RunSummary {
             _ => {}
         }
         if is_found {
-            remarks.extend(doubts(&self.period_modes));
+            // the period of a planet of known ephemeris is no choice of the search
+            if search.verdict.known.is_none() {
+                remarks.extend(doubts(&self.period_modes));
+            }
             let heaviest = self.period_modes.first().map(|mode| mode.porb_over_prot);
             let period = heaviest.unwrap_or(settings.values[Parameter::PorbOverProt]);
             remarks.extend(search.of_another_orbit(period, rotation_period_d));
