@@ -130,6 +130,36 @@ fn offsets_of_nights_are_noise_of_the_orbit_in_search_and_chain() {
     assert!(searched > 1.5 * plain && (sampled / searched - 1.0).abs() < 0.05, "{plain} {searched} {sampled}");
 }
 
+/// Beside the first planet alone they would absorb the second.
+#[test]
+fn offsets_of_nights_are_no_second_planet() {
+    let (ratio, k_kms) = (4.3, 0.09);
+    let uniform = |min: f64, max: f64| json!({ "prior": "uniform", "min": min, "max": max });
+    let config = Config::load(&folder("static-planet").join("config.json")).unwrap().with("imaging.pixels", 600);
+    let config = config
+        .with("planet.k2_kms", 0.05)
+        .with("planet.porb2_over_prot", ratio)
+        .with("planet.phi2", 0.5)
+        .with("parameters.k2_kms", uniform(0.0, 0.6))
+        .with("parameters.porb2_over_prot", uniform(3.5, 6.0))
+        .with("parameters.phi2", json!({ "prior": "periodic" }));
+    let mut scene = Scene::new(&config).unwrap();
+    let cycles = scene.imager.cycles();
+    for (k, cycle) in cycles.iter().enumerate() {
+        let second = k_kms * (std::f64::consts::TAU * (cycle / ratio - 0.2)).cos();
+        scene.imager.sets[0].sampling.profiles[k].1 -= second;
+    }
+    let found = find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()).unwrap();
+    let detection = found.detection.unwrap();
+    let absorbing = detection.last().field.as_ref().unwrap().night_offsets_kms;
+    let both = detection.second.as_ref().unwrap().both.unwrap();
+    let second = both.orbits[1].orbit;
+    assert!(absorbing > 0.02 && second.sigma_k_kms < 0.6 * absorbing, "{absorbing} {second:?}");
+    assert!((second.k_kms - k_kms).abs() < 3.0 * second.sigma_k_kms, "{second:?}");
+    let record = serde_json::to_value(found.posterior.record()).unwrap();
+    assert_eq!(record.get("night_offsets_kms"), None);
+}
+
 /// The prior of the field is also used where it is fitted.
 #[test]
 fn a_prior_of_the_field_counts_in_its_fit() {
