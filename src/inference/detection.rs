@@ -380,7 +380,7 @@ impl Detection {
             }
             let here = match &held {
                 Some(held) => held.linearise(at, Some(self.last()))?,
-                None => self.noisy(surface, at, surface.linearise(at, Some(self.last()))?)?,
+                None => self.noisy(surface, at, surface.linearise(at, Some(self.last()))?),
             };
             let here = self.known.whole(here, &at.values);
             let mut next = refined(&self.known.beside(&here.quadratic), &self.frequencies, &self.best);
@@ -399,17 +399,17 @@ impl Detection {
 
     /// The star `here`, with the best orbit, with the most likely RV offsets of nights beside an orbit of that period,
     /// if any are needed: without the planet in the model they would absorb it.
-    fn noisy(&self, surface: &dyn SurfaceModel, at: At, here: Linearised) -> Result<Linearised, SurfaceError> {
+    fn noisy(&self, surface: &dyn SurfaceModel, at: At, here: Linearised) -> Linearised {
         if self.without_jitter.as_ref().is_none_or(|star| star.nights.is_none()) {
-            return Ok(here);
+            return here;
         }
-        let noise = surface.without_jitter(at, &here)?.and_then(|star| {
+        let noise = surface.without_jitter(at, &here).ok().flatten().and_then(|star| {
             let velocities = self.known.beside(&star.here.quadratic);
             star.noise(&without(&velocities, 1.0 / self.best.porb_over_prot)?)
         });
         let needed = noise.filter(|noise| noise.night_kms > 0.0);
         let noisy = needed.and_then(|noise| surface.with_noise(at, &here, noise).ok());
-        Ok(noisy.unwrap_or(here))
+        noisy.unwrap_or(here)
     }
 
     /// The Keplerian orbits of all peaks.
