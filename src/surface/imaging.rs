@@ -233,9 +233,18 @@ impl Imager {
                 Common { of_each, mean_kms: 0.0, sd_kms }
             })
         };
-        let size_kms = |set: usize| self.night_jitters_kms.get(set).copied().flatten().unwrap_or(unknown_kms);
-        let sizes = (0..self.sets.len()).map(|set| (set, size_kms(set)));
-        sizes.filter(|(_, sd_kms)| *sd_kms > 0.0).flat_map(of_set).collect()
+        self.offset_sets(unknown_kms).flat_map(of_set).collect()
+    }
+
+    /// The data sets with RV offsets of nights, and their size (km/s).
+    fn offset_sets(&self, unknown_kms: f64) -> impl Iterator<Item = (usize, f64)> {
+        let sizes = (0..self.sets.len()).map(move |set| (set, self.night_jitter_kms(set).unwrap_or(unknown_kms)));
+        sizes.filter(|(_, sd_kms)| *sd_kms > 0.0)
+    }
+
+    /// The size of the RV offsets of nights (km/s) that is given for a data set.
+    fn night_jitter_kms(&self, set: usize) -> Option<f64> {
+        self.night_jitters_kms.get(set).copied().flatten()
     }
 
     /// The nights of a data set, by the indices of their profiles.
@@ -249,8 +258,10 @@ impl Imager {
 
     /// Nights of the data sets whose night offsets have an unknown size, by the indices of their profiles.
     pub fn nights_of_sets(&self) -> Vec<Vec<usize>> {
-        let is_known = |set: &usize| self.night_jitters_kms.get(*set).is_some_and(Option::is_some);
-        (0..self.sets.len()).filter(|set| !is_known(set)).flat_map(|set| self.nights_of(set)).collect()
+        (0..self.sets.len())
+            .filter(|set| self.night_jitter_kms(*set).is_none())
+            .flat_map(|set| self.nights_of(set))
+            .collect()
     }
 
     /// The same with drifts of the velocities: one of all profiles whose offsets are known, and one of each data set
@@ -300,8 +311,7 @@ impl Imager {
 
     /// Whether any velocities are marginalised over beside those of single profiles, with night offsets as there.
     pub fn has_shared_velocities(&self, unknown_kms: f64) -> bool {
-        let size_kms = |set: usize| self.night_jitters_kms.get(set).copied().flatten().unwrap_or(unknown_kms);
-        self.has_common_velocities() || (0..self.sets.len()).any(|set| size_kms(set) > 0.0)
+        self.has_common_velocities() || self.offset_sets(unknown_kms).next().is_some()
     }
 
     /// Times (d) of all profiles, and then of all bins of light curves.

@@ -212,7 +212,7 @@ fn of_share(
 }
 
 /// The profiles with a field from neighbouring maps, or from uniform ones: maps of another orbit may be too far away.
-fn anew(
+pub(super) fn anew(
     assumed: Assumed,
     near: &Marginal,
     at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,

@@ -3,6 +3,7 @@
 //! The fit of the field finds a jitter. Offsets of nights take its place where they are more likely: from the
 //! velocities of the star without either, as in the search for a planet (`planets::periodogram::nights`).
 
+use super::fit::anew;
 use super::linearised::linearised;
 use super::{Assumed, Fitted, Known, Marginal};
 use crate::field::FieldError;
@@ -36,11 +37,11 @@ pub(super) fn with(at: At, here: &Linearised, noise: Scatter) -> Result<Linearis
     let Scatter { jitter_kms, night_kms } = noise;
     let Fitted { marginal, at_bounds, hessian, .. } = here.kept::<Fitted>();
     let assumed = Assumed { jitter_kms, night_kms, ..marginal.assumed };
-    let anew = |near: Option<&Marginal>| {
+    let noisy = |assumed: Assumed, near: Option<&Marginal>| {
         let (basis, design) = (&marginal.basis, Arc::clone(&marginal.design));
         Marginal::new(at.imager, basis, design, marginal.values, assumed, near)
     };
-    let marginal = anew(Some(marginal)).or_else(|_| anew(None))?;
+    let marginal = anew(assumed, marginal, &noisy)?;
     let fitted = Fitted { at_bounds: at_bounds.clone(), hessian: *hessian, ..Fitted::near(marginal) };
     linearised(at.imager, fitted, at.nuisances)
 }

@@ -123,11 +123,8 @@ impl<'a> Planned<'a> {
         let evidence = Evidence::new(field, degrees, &some, &around, self.basis.settling.compression)?;
         let stellar = self.stellar();
         let quadratic = summed(evidence.quadratic(), some.len(), profiles.len(), stellar.len());
-        let shared = self
-            .imager
-            .night_offsets(count, self.assumed.night_kms)
-            .into_iter()
-            .chain(self.imager.common_velocities(count));
+        let of_nights = self.imager.night_offsets(count, self.assumed.night_kms);
+        let shared = of_nights.into_iter().chain(self.imager.common_velocities(count));
         let of_part = |one: Common| {
             let of = |i: usize| profiles.get(i).map_or(0.0, |k| one.of_each[*k]);
             Common { of_each: DVector::from_fn(quadratic.gradient.len(), |i, _| of(i)), ..one }
