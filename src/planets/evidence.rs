@@ -84,8 +84,9 @@ const OVERSAMPLING: f64 = 60.0;
 /// Most frequencies.
 const MOST_FREQUENCIES: usize = 40_000;
 
-/// Draws per repetition, and number of repetitions.
+/// Draws per repetition at a single jitter, fewest of several in units of these, and number of repetitions.
 const DRAWS: usize = 4000;
+const FEWEST: f64 = 0.1;
 const REPETITIONS: usize = 8;
 
 /// Share of the draws of periods that are spread over the prior.
@@ -106,18 +107,23 @@ pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Opti
     let circles: Vec<f64> = weights.iter().zip(&ones).map(|(weight, one)| weight + one.ln_z).collect();
     let highest = circles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let counting: Vec<usize> = (0..ones.len()).filter(|k| circles[*k] > highest - NEGLIGIBLE).collect();
-    let levels: Vec<OfLevel> =
-        counting.iter().map(|k| OfLevel::new(quadratics[*k], &ones[*k], priors)).collect::<Option<_>>()?;
+    let total = ln_sum(&circles);
+    let draws = |k: usize| (DRAWS as f64 * (circles[k] - total).exp().max(FEWEST)).ceil() as usize;
+    let of_level = |k: &usize| OfLevel::new(quadratics[*k], (&ones[*k], draws(*k)), priors);
+    let levels: Vec<OfLevel> = counting.iter().map(of_level).collect::<Option<_>>()?;
     let mix = |estimate: &dyn Fn(&OfLevel, &VelocityQuadratic) -> LnBayes| {
         let of = |(k, level): (&usize, &OfLevel)| (weights[*k] - alone, estimate(level, quadratics[*k]));
         mixed(&counting.iter().zip(&levels).map(of).collect::<Vec<_>>())
     };
-    let ellipse = mix(&|of, quadratic| repeated(seed, |rng| ellipse(quadratic, priors[0], of.one, rng)));
+    let ellipse = mix(&|of, quadratic| {
+        let circle = (of.one, of.draws);
+        repeated(seed, |rng| ellipse(quadratic, priors[0], circle, rng))
+    });
     let two_circles = mix(&|of, quadratic| {
         let pairs = of.pairs();
-        repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, &pairs, rng))
+        repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, (&pairs, of.draws), rng))
     });
-    let circle = LnBayes { ln_bayes: ln_sum(&circles) - alone, sd: None };
+    let circle = LnBayes { ln_bayes: total - alone, sd: None };
     Some(Evidence { circle, ellipse, two_circles, inclusion: Periodogram::mixed(&weights, &ones).inclusion() })
 }
 
@@ -138,6 +144,8 @@ fn mixed(parts: &[(f64, LnBayes)]) -> LnBayes {
 struct OfLevel<'a> {
     /// One planet.
     one: &'a Periodogram,
+    /// Draws per repetition: as many as the jitter has a share in the evidence of one planet.
+    draws: usize,
     /// The second with the first at its best, and vice versa.
     beside: Option<Periodogram>,
     other: Periodogram,
@@ -145,12 +153,16 @@ struct OfLevel<'a> {
 }
 
 impl<'a> OfLevel<'a> {
-    fn new(quadratic: &VelocityQuadratic, one: &'a Periodogram, priors: [&PlanetPrior; 2]) -> Option<Self> {
+    fn new(
+        quadratic: &VelocityQuadratic,
+        (one, draws): (&'a Periodogram, usize),
+        priors: [&PlanetPrior; 2],
+    ) -> Option<Self> {
         let rest = |best: &Periodogram, prior: &PlanetPrior| {
             without(quadratic, best.frequency(best.best())).and_then(|rest| Periodogram::new(&rest, prior))
         };
         let other = Periodogram::new(quadratic, priors[1])?;
-        Some(OfLevel { beside: rest(one, priors[1]), before: rest(&other, priors[0]), one, other })
+        Some(OfLevel { beside: rest(one, priors[1]), before: rest(&other, priors[0]), one, draws, other })
     }
 
     fn pairs(&self) -> Vec<[&Periodogram; 2]> {
@@ -398,7 +410,12 @@ fn projected(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> (DMatrix<f64>, 
 }
 
 /// An estimate of ln Z of one Keplerian orbit.
-fn ellipse(quadratic: &VelocityQuadratic, prior: &PlanetPrior, circle: &Periodogram, rng: &mut ChaCha8Rng) -> f64 {
+fn ellipse(
+    quadratic: &VelocityQuadratic,
+    prior: &PlanetPrior,
+    (circle, draws): (&Periodogram, usize),
+    rng: &mut ChaCha8Rng,
+) -> f64 {
     let mid = mid_cycle(&quadratic.cycles);
     let weight = |_: usize| {
         let frequency = circle.draw(rng);
@@ -416,15 +433,15 @@ fn ellipse(quadratic: &VelocityQuadratic, prior: &PlanetPrior, circle: &Periodog
         let ln_prior = (prior.period.ln)(1.0 / frequency) - 2.0 * frequency.ln();
         ln_prior - circle.density(frequency).ln() + ln_e + ln_over_k_and_phase(&a, &b, &prior.k)
     };
-    let all: Vec<f64> = (0..DRAWS).map(weight).collect();
-    ln_sum(&all) - (DRAWS as f64).ln()
+    let all: Vec<f64> = (0..draws).map(weight).collect();
+    ln_sum(&all) - (draws as f64).ln()
 }
 
 /// An estimate of ln Z of two circular orbits; frequencies are drawn from the `pairs` with equal probability.
 fn two_circles(
     quadratic: &VelocityQuadratic,
     priors: [&PlanetPrior; 2],
-    pairs: &[[&Periodogram; 2]],
+    (pairs, draws): (&[[&Periodogram; 2]], usize),
     rng: &mut ChaCha8Rng,
 ) -> f64 {
     let mid = mid_cycle(&quadratic.cycles);
@@ -463,8 +480,8 @@ fn two_circles(
             (0..2).map(|j| (priors[j].period.ln)(1.0 / frequencies[j]) - 2.0 * frequencies[j].ln()).sum();
         ln_prior_k + ln_first + ln_second + ln_periods - density.ln() - first.density(&x).ln()
     };
-    let all: Vec<f64> = (0..DRAWS).map(weight).collect();
-    ln_sum(&all) - (DRAWS as f64).ln()
+    let all: Vec<f64> = (0..draws).map(weight).collect();
+    ln_sum(&all) - (draws as f64).ln()
 }
 
 /// Proposal distribution of (a, b) of the first of two orbits: a mixture of a Gaussian somewhat wider than its

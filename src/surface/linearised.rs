@@ -74,8 +74,9 @@ impl WithoutJitter {
     /// The same for some of the profiles, in their order, with the sizes that are likely in `of_all`.
     pub fn of_some_beside(&self, quadratic: &VelocityQuadratic, of_all: &Jitters) -> Jitters {
         let nights = self.nights.as_ref().map(|nights| nights.of(&quadratic.cycles, &self.here.quadratic.cycles));
-        let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, (self.found_kms, self.scale_kms));
-        nights.and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
+        let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, self.scale_kms);
+        let jitter_kms = (self.found_kms, of_all.units().jitter_kms);
+        nights.and_then(beside).unwrap_or_else(|| Jitters::in_units(quadratic, jitter_kms, self.scale_kms))
     }
 
     /// The most likely jitter and night offsets of these velocities of this star, in which orbits are left free.
@@ -91,10 +92,7 @@ impl WithoutJitter {
 
     /// With jitters of several sizes only.
     pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        match self.found_kms > 0.0 {
-            true => Jitters::new(quadratic, self.found_kms, self.scale_kms),
-            false => Jitters::none(quadratic),
-        }
+        Jitters::new(quadratic, self.found_kms, self.scale_kms)
     }
 }
 

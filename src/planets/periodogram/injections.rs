@@ -67,7 +67,8 @@ pub struct Injections<'a> {
 struct Field<'a> {
     star: &'a OfField,
     scale_kms: Option<f64>,
-    nights: Nights,
+    nights: Option<Nights>,
+    is_known: bool,
     sizes: Vec<Size>,
 }
 
@@ -152,12 +153,14 @@ impl<'a> Injections<'a> {
             let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
             let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
             // without offsets in the model a jitter absorbs them
-            let jitter = (jitter_kms.hypot(night_kms), field.scale_kms);
-            let of_offsets = || beside(velocities, &field.nights, size.scatter, jitter, Reach::Stable);
-            let jitters = match (jitter_kms > 0.0, night_kms > 0.0) {
-                (false, false) => Jitters::none(velocities),
-                (true, false) => of_jitter(),
-                (_, true) => of_offsets().unwrap_or_else(of_jitter),
+            let of_nights = |nights: &Nights| {
+                let units = nights.units(velocities, size.scatter, jitter_kms.hypot(night_kms));
+                beside(velocities, nights, (size.scatter, units), field.scale_kms, Reach::Stable)
+            };
+            let of_offsets = || field.nights.as_ref().and_then(of_nights);
+            let jitters = match field.is_known {
+                true => Jitters::none(velocities),
+                false => of_offsets().unwrap_or_else(of_jitter),
             };
             let SearchSettings { draws, seed } = self.settings;
             FalseAlarm::draw(&jitters, &self.frequencies.per_cycle, draws, seed).level(self.probability)
@@ -187,13 +190,13 @@ impl<'a> Field<'a> {
                 (*scale_kms, nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
             }
         };
-        let nights = nights.unwrap_or_else(|| Nights::none(velocities.len()));
+        let of_all = nights.clone().unwrap_or_else(|| Nights::none(velocities.len()));
         let size = |scatter: &Scatter| {
-            let beside = Beside::new(velocities, &nights, *scatter, (scale_kms, Reach::Stable))?;
+            let beside = Beside::new(velocities, &of_all, *scatter, (scale_kms, Reach::Stable))?;
             Some(Size::new(*scatter, &beside, velocities, frequencies))
         };
         let sizes = scatters.par_iter().filter_map(size).collect();
-        Field { star, scale_kms, nights, sizes }
+        Field { star, scale_kms, nights, is_known: matches!(jitter, Jitter::Known), sizes }
     }
 
     /// With `orbits` of 1 km/s, cos and sin of one period.
@@ -288,7 +291,7 @@ impl Column<'_, '_> {
         let (of, field) = (&self.fields[field], &self.all.fields[field]);
         let alone = field.alone(of, ab);
         let best_alone = largest(&alone)?;
-        // like a search: where zero offsets are the best without a planet, none are tried
+        // offsets that the velocities do not need without an orbit are not needed with it, either
         let has_offsets = |size: usize| field.sizes[size].scatter.night_kms > 0.0;
         let is_tried = |size: &usize| has_offsets(best_alone) || !has_offsets(*size);
         let of_orbit = |size: usize| if is_tried(&size) { sum(&of.whitened[size], ab) } else { DVector::zeros(0) };

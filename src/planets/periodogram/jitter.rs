@@ -3,14 +3,18 @@
 //! Marginalised over the offsets, `ln L(V)` of information I becomes that of the information `(1 + s^2 I)^-1 I`. A
 //! jitter found without a planet in the model may be due to the planet: with few profiles a strong signal would be
 //! absorbed. So s is fitted both without an orbit and with each orbit, as in the F-test of a periodogram of unknown
-//! noise. Simulated stars without a planet have the jitter found without one, and are searched in the same way.
+//! noise. Simulated stars without a planet have the jitter found without one, and are searched in the same way: also
+//! where none was found, as in half of them chance mimics one, which lowers their peaks.
 
 use super::orbits::{CircularOrbit, Trial, scan};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 
-/// Trial jitters, in units of the one found without a planet.
+/// Trial jitters, in units of the one found without a planet, or that chance mimics.
 const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, std::f64::consts::SQRT_2];
+
+/// By how many of its standard errors a variance exceeds 0 by chance.
+const BY_CHANCE: f64 = 2.0;
 
 /// Directions of the gradient with less than this fraction of the largest variance are dropped.
 const STILL: f64 = 1e-13;
@@ -28,6 +32,14 @@ pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
     if last == 0 { vec![0.0] } else { (0..=last).map(|k| share(k).ln()).collect() }
 }
 
+/// The standard deviation (km/s) of offsets of so many groups of profiles that chance mimics where there are none: with
+/// profiles of equal errors, a variance of `sqrt(2 / groups)` times that of a group's mean is one standard error.
+pub(super) fn by_chance_kms(without: &VelocityQuadratic, groups: usize) -> f64 {
+    let groups = groups as f64;
+    let mean_variance = groups / without.information.trace();
+    (BY_CHANCE * mean_variance * (2.0 / groups).sqrt()).sqrt()
+}
+
 /// Standard deviations (km/s) of jitter and nightly offsets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatter {
@@ -43,8 +55,10 @@ pub struct Jitters {
     pub(super) levels: Vec<Level>,
     /// ln of the weight of each under a prior that is uniform up to the largest.
     pub(super) ln_shares: Vec<f64>,
-    /// The noise of stars without a planet, where it includes nightly offsets.
+    /// The noise of stars without a planet, where it may include nightly offsets.
     pub(super) null: Option<Scatter>,
+    /// Units of the trial sizes.
+    pub(super) units: Scatter,
     /// Covariance of the gradient, without jitter, of a star without a planet.
     pub(super) covariance: DMatrix<f64>,
 }
@@ -94,20 +108,28 @@ impl Jitters {
             solved: DMatrix::zeros(0, n),
             kept: DMatrix::identity(n, n),
         };
-        Jitters { levels: vec![level], ln_shares: vec![0.0], null: None, covariance: quadratic.information.clone() }
+        let units = Scatter { jitter_kms: 0.0, night_kms: 0.0 };
+        let covariance = quadratic.information.clone();
+        Jitters { levels: vec![level], ln_shares: vec![0.0], null: None, units, covariance }
     }
 
     /// Jitters added to the quadratic `without` one; `found_kms` is the standard deviation (km/s) found without a
     /// planet; with the [`ln_prior`] of a scale.
     pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: Option<f64>) -> Self {
+        let unit_kms = found_kms.max(by_chance_kms(without, without.len()));
+        Jitters::in_units(without, (found_kms, unit_kms), scale_kms)
+    }
+
+    /// The same with trial jitters in this unit (km/s).
+    pub fn in_units(without: &VelocityQuadratic, (found_kms, unit_kms): (f64, f64), scale_kms: Option<f64>) -> Self {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
         let among = |d: DVector<f64>| &u * DMatrix::from_diagonal(&d) * u.transpose();
         let pulled = u.tr_mul(&without.gradient);
         let level = |size: f64| {
-            let variance = (size * found_kms).powi(2);
+            let variance = (size * unit_kms).powi(2);
             let left = lambda.map(|l| 1.0 / (1.0 + variance * l));
-            let constant = 0.5 * left.map(f64::ln).sum() + ln_prior(size * found_kms, scale_kms);
+            let constant = 0.5 * left.map(f64::ln).sum() + ln_prior(size * unit_kms, scale_kms);
             let information = among(lambda.component_mul(&left));
             Level {
                 ln_l: constant + 0.5 * variance * pulled.component_mul(&pulled).dot(&left),
@@ -125,12 +147,18 @@ impl Jitters {
         let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
         levels.iter_mut().for_each(|level| level.ln_l -= best);
         let covariance = among(lambda.map(|l| l + (found_kms * l).powi(2)));
-        Jitters { levels, ln_shares: ln_shares(&SIZES), null: None, covariance }
+        let units = Scatter { jitter_kms: unit_kms, night_kms: 0.0 };
+        Jitters { levels, ln_shares: ln_shares(&SIZES), null: None, units, covariance }
     }
 
     /// ln L of no planet at each size, weighted by a prior that is uniform up to the largest.
     pub fn ln_weights(&self) -> Vec<f64> {
         self.levels.iter().zip(&self.ln_shares).map(|(level, ln_share)| level.ln_l + ln_share).collect()
+    }
+
+    /// Units of the trial sizes.
+    pub fn units(&self) -> Scatter {
+        self.units
     }
 
     /// All sizes.

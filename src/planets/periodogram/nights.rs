@@ -5,24 +5,24 @@
 //! nights. With it ln L of information I and gradient g has the information `I - I M I` and the gradient `(1 - I M) g`,
 //! `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As for a jitter
 //! alone (`jitter`), s and t are fitted without an orbit and with each orbit. Simulated stars without a planet have the
-//! values that are the most likely without one.
+//! values that are the most likely without one, and are searched in the same way, also where these are 0.
 
 use super::draws::amplitudes;
-use super::jitter::{Jitters, Level, Scatter, ln_prior, ln_shares};
+use super::jitter::{Jitters, Level, Scatter, by_chance_kms, ln_prior, ln_shares};
 use super::{FalseAlarm, Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Trial jitters, in units of the one found without offsets.
+/// Trial jitters, in units of the one found without offsets, or with each orbit that chance mimics.
 const JITTERS: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 
 /// Trial offsets for the most likely one, in units of the rms of the velocities: first, last, and ratio, within the
 /// [`Reach`].
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
-/// Trial offsets with each orbit, in units of the most likely one.
+/// Trial offsets with each orbit, in units of the most likely one, or that chance mimics.
 const PARTS: [f64; 4] = [0.0, 0.5, 1.0, 1.4];
 
 /// Default stability of a spectrograph (km/s): that of ESPaDOnS and Narval.
@@ -79,6 +79,15 @@ impl Nights {
         Nights(DMatrix::zeros(profiles, 0))
     }
 
+    /// Units of trial sizes beside orbits, where the jitter is `found_kms` without offsets and the noise of stars without
+    /// a planet is `null`: that, or what chance mimics.
+    pub(super) fn units(&self, without: &VelocityQuadratic, null: Scatter, found_kms: f64) -> Scatter {
+        Scatter {
+            jitter_kms: found_kms.max(by_chance_kms(without, without.len())),
+            night_kms: null.night_kms.max(by_chance_kms(without, self.0.ncols())),
+        }
+    }
+
     /// The nights of a subset of `all` profiles, matched by their rotation cycles, both in the same order.
     #[must_use]
     pub fn of(&self, left: &[f64], all: &[f64]) -> Self {
@@ -98,8 +107,7 @@ pub struct Offsets {
 }
 
 /// The likelihood of the velocities with a jitter, found to be `found_kms` without a planet and with a prior of that
-/// scale, the stability of the spectrograph, and with offsets of `nights` within that `reach`. `None` where zero
-/// offsets are the most likely without a planet.
+/// scale, the stability of the spectrograph, and with offsets of `nights` within that `reach`.
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -107,9 +115,8 @@ pub fn beside_offsets(
     reach: Reach,
 ) -> Option<(Jitters, Offsets)> {
     let (null, gain) = most_likely(without, nights, (found_kms, scale_kms), reach)?;
-    let offsets = Offsets { sigma_kms: null.night_kms, gain };
-    let all = || beside(without, nights, null, (found_kms, scale_kms), reach);
-    if null.night_kms > 0.0 { Some((all()?, offsets)) } else { None }
+    let all = beside(without, nights, (null, nights.units(without, null, found_kms)), scale_kms, reach)?;
+    Some((all, Offsets { sigma_kms: null.night_kms, gain }))
 }
 
 /// The most likely jitter and offsets where these velocities are 0, and by how much the offsets raise ln L, including
@@ -146,27 +153,27 @@ pub fn beside_offsets_of(
     of_all: &Jitters,
     without: &VelocityQuadratic,
     nights: &Nights,
-    jitter: (f64, Option<f64>),
+    scale_kms: Option<f64>,
 ) -> Option<Jitters> {
-    beside(without, nights, of_all.null?, jitter, Reach::Stable)
+    beside(without, nights, (of_all.null?, of_all.units), scale_kms, Reach::Stable)
 }
 
-/// The same where `null` has the jitter and offsets of stars without a planet, and the jitter reaches up to
-/// `found_kms`.
+/// The same where `null` has the jitter and offsets of stars without a planet; trial sizes are in these units.
 pub(super) fn beside(
     without: &VelocityQuadratic,
     nights: &Nights,
-    null: Scatter,
-    (found_kms, scale_kms): (f64, Option<f64>),
+    (null, units): (Scatter, Scatter),
+    scale_kms: Option<f64>,
     reach: Reach,
 ) -> Option<Jitters> {
-    let (jitters, offsets) = (jitters(found_kms), reach.of(&PARTS.map(|part| part * null.night_kms), scale_kms));
+    let offsets = reach.of(&PARTS.map(|part| part * units.night_kms), scale_kms);
+    let jitters = jitters(units.jitter_kms);
     let of = |one: Scatter| Beside::new(without, nights, one, (scale_kms, reach));
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
     let of_jitter = ln_shares(&jitters);
     let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
     let (levels, covariance) = levels(without, &of(null)?, all?);
-    Some(Jitters { levels, ln_shares: shares.collect(), null: Some(null), covariance })
+    Some(Jitters { levels, ln_shares: shares.collect(), null: Some(null), units, covariance })
 }
 
 /// The likelihood of the velocities with this noise, a jitter and offsets of `nights`.
@@ -175,6 +182,7 @@ pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) 
 }
 
 /// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).
+/// `None` where zero offsets are the most likely without a planet.
 pub fn peak_beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
@@ -183,6 +191,9 @@ pub fn peak_beside_offsets(
     SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
     let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter, Reach::Any)?;
+    if sigma_kms == 0.0 {
+        return None;
+    }
     let height = all.orbit_at(frequency)?.delta_ln_l;
     let alarm = FalseAlarm::draw(&all, &frequencies.per_cycle, DRAWS.min(draws), seed);
     Some(NightOffsets { sigma_kms, gain, false_alarm_probability: alarm.probability(height).value() })
@@ -197,6 +208,9 @@ pub fn known_beside_offsets(
     SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
     let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter, Reach::Any)?;
+    if sigma_kms == 0.0 {
+        return None;
+    }
     let (height, draws) = (all.height_above_zero(unit), DRAWS.min(draws));
     let above = amplitudes(&all, unit, draws, seed).into_iter().filter(|drawn| *drawn >= height).count();
     Some(NightOffsets { sigma_kms, gain, false_alarm_probability: (1 + above) as f64 / (1 + draws) as f64 })

@@ -78,6 +78,33 @@ fn offsets_of_nights_are_no_planet() {
     assert!((0.65..1.05).contains(&(sizes.sqrt() / 0.06)), "{sizes}");
 }
 
+/// Without any noise but that of the profiles a chance jitter or offset takes a part of the peaks: stars that are drawn
+/// without one have peaks that are as high.
+#[test]
+fn stars_without_offsets_are_searched_like_those_that_are_drawn() {
+    let (nights, zero) = (of(0.0, 0.0, 0.0, 0).1, Scatter { jitter_kms: 0.0, night_kms: 0.0 });
+    let frequencies = Frequencies::new(&of(0.0, 0.0, 0.0, 0).0.cycles, 1.0, FrequencySettings::default()).unwrap();
+    let of_star = |seed: u64| {
+        let velocities = of(0.0, 0.0, 0.0, seed).0;
+        let units = nights.units(&velocities, zero, 0.0);
+        (beside(&velocities, &nights, (zero, units), None, Reach::Stable).unwrap(), velocities)
+    };
+    let (first, velocities) = of_star(0);
+    let drawn = FalseAlarm::draw(&first, &frequencies.per_cycle, 4000, 1);
+    let alone = FalseAlarm::draw(&Jitters::none(&velocities), &frequencies.per_cycle, 4000, 1);
+    assert!(drawn.level(0.1) < alone.level(0.1) - 0.3, "{} {}", drawn.level(0.1), alone.level(0.1));
+    let highest = |seed: u64| {
+        let trials = of_star(seed).0.scan(&frequencies.per_cycle);
+        trials.iter().map(|trial| trial.delta_ln_l).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let mut all: Vec<f64> = (1..=200).map(|seed| drawn.probability(highest(seed)).by_draws).collect();
+    all.sort_by(f64::total_cmp);
+    let apart = |(k, p): (usize, &f64)| ((k as f64 + 0.5) / all.len() as f64 - p).abs();
+    let distance = all.iter().enumerate().map(apart).fold(0.0, f64::max);
+    // exceeded once in a hundred by chance: 1.63 / sqrt(200)
+    assert!(distance < 0.115, "{distance}");
+}
+
 /// Of a planet whose ephemeris is known.
 fn known(night_kms: f64, k_kms: f64, seed: u64) -> Option<NightOffsets> {
     let (velocities, nights) = of(0.0, night_kms, k_kms, seed);
@@ -175,7 +202,8 @@ fn amplitudes_have_the_variance_of_the_gradient() {
     let expected = pulled.dot(&(&covariance * &pulled)) / unit.dot(&pulled);
     let transposed = (root(&found) * &levels[0].kept * &unit).norm_squared() / unit.dot(&pulled);
     assert!((transposed / expected - 1.0).abs() > 0.15, "{transposed} {expected}: does not tell");
-    let jitters = Jitters { levels, ln_shares: vec![0.0], null: None, covariance: found };
+    let (ln_shares, units) = (vec![0.0], Scatter { jitter_kms: 0.0, night_kms: 0.3 });
+    let jitters = Jitters { levels, ln_shares, null: None, units, covariance: found };
     // half of the amplitudes are above zero, where Delta ln L is half of their square
     let drawn = amplitudes(&jitters, &unit, 20_000, 1);
     let variance = 4.0 * drawn.iter().sum::<f64>() / drawn.len() as f64;
@@ -199,8 +227,9 @@ fn without_a_night_the_offsets_stay() {
         information: velocities.information.view((3, 3), (33, 33)).into_owned(),
     };
     let nights = nights.of(&others.cycles, &velocities.cycles);
-    assert!(beside_offsets(&others, &nights, jitter, Reach::Stable).is_none(), "the others have no offsets");
-    let some = beside_offsets_of(&all, &others, &nights, jitter).unwrap();
+    let (_, of_others) = beside_offsets(&others, &nights, jitter, Reach::Stable).unwrap();
+    assert_eq!(of_others.sigma_kms, 0.0, "the others have no offsets");
+    let some = beside_offsets_of(&all, &others, &nights, jitter.1).unwrap();
     assert_eq!((some.null, some.levels.len(), &some.ln_shares), (all.null, all.levels.len(), &all.ln_shares));
     // that without offsets is the most likely one of the same levels
     let best = (0..some.levels.len()).max_by(|a, b| some.levels[*a].ln_l.total_cmp(&some.levels[*b].ln_l)).unwrap();
