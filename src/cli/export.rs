@@ -60,8 +60,8 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     let written = export::write(&contents, format, &out, args.force)?;
     let names: Vec<String> = written.iter().map(|path| shown(path)).collect();
     console::line(format_args!("written: {}", names.join(", ")));
-    if !contents.summary.converged {
-        console::line("note: the chain has not converged, `dimcmc analyse` says what to do");
+    for note in contents.notes() {
+        console::line(format_args!("note: {note}"));
     }
     Ok(())
 }

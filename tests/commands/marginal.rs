@@ -39,6 +39,25 @@ fn a_chain_has_the_same_bytes_by_any_number_of_threads() {
 }
 
 #[test]
+fn an_export_of_a_fast_star_says_what_its_draws_lack() {
+    let mut config = changing(1);
+    config["star"]["vsini_kms"] = json!(50);
+    config["observations"]["simulate"]["velocity_kms"] = json!({ "min": -63.0, "max": 63.0, "step": 7.0 });
+    config["sampler"]["walkers"] = json!(12);
+    config["parameters"]["inclination_deg"] = json!({ "prior": "isotropic" });
+    let desk = Desk::new(config);
+    says(&desk.succeed(&["sample", CONFIG, "--out", "run"]), &["inclination_deg are multiplied by 1.6"]);
+    let note = "quoted uncertainties as summary.json does: inclination_deg by 1.6";
+    says(&desk.succeed(&["export", "run", "--format", "zarr"]), &[note]);
+    says(&desk.read("run/chain.zarr/posterior/inclination_deg/zarr.json"), &["\"sigma_factor\": 1.6"]);
+    assert!(!desk.read("run/chain.zarr/posterior/k_kms/zarr.json").contains("sigma_factor"));
+    desk.succeed(&["export", "run", "--format", "emcee"]);
+    let file = std::fs::read(desk.path("run/chain.h5")).unwrap();
+    let held = br#"{"inclination_deg":1.6}"#;
+    assert!(file.windows(held.len()).any(|window| window == held));
+}
+
+#[test]
 fn a_landscape_is_that_of_the_chain_with_the_field_held() {
     let desk = Desk::new(changing(1));
     let table = desk.succeed(&["grid", CONFIG, "--out", "grid"]);

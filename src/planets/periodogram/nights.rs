@@ -79,8 +79,8 @@ impl Nights {
         Nights(DMatrix::zeros(profiles, 0))
     }
 
-    /// Units of trial sizes beside orbits, where the jitter is `found_kms` without offsets and the noise of stars without
-    /// a planet is `null`: that, or what chance mimics.
+    /// Units of trial sizes beside orbits, where the jitter is `found_kms` without offsets and stars without a planet
+    /// have the noise `null`: that, or what chance mimics.
     pub(super) fn units(&self, without: &VelocityQuadratic, null: Scatter, found_kms: f64) -> Scatter {
         Scatter {
             jitter_kms: found_kms.max(by_chance_kms(without, without.len())),

@@ -7,7 +7,7 @@ use crate::model::{FreeParameter, Prior, Quoted};
 use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
 use crate::runs::run::{CHAIN, read_chain};
 use crate::sampling::chain::{Chain, Settled, statistics::unwrap_around};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
 /// A run, read for export.
@@ -52,6 +52,8 @@ pub struct Quantity {
     pub centre: Option<f64>,
     /// Injected value, for simulated data.
     pub injected: Option<f64>,
+    /// Factor by which `summary.json` has larger uncertainties than the draws.
+    pub sigma_factor: Option<f64>,
 }
 
 /// A quantity derived from the parameters of a draw.
@@ -99,6 +101,7 @@ impl Contents {
                 bounds: bounds(&free.prior),
                 centre: periodic.then(|| summary.parameters[name].mode),
                 injected: manifest.origin.truth.as_ref().and_then(|truth| truth.get(name).copied()),
+                sigma_factor: manifest.origin.reference.widening(free.parameter),
             }
         };
         let parameters = settings.free.iter().zip(&kinds).map(quantity).collect();
@@ -142,6 +145,27 @@ impl Contents {
     pub fn injected(&self) -> Option<String> {
         let value = |one: &Quantity| Some((one.name.clone(), Value::from(one.injected?)));
         Some(self.parameters.iter().map(value).collect::<Option<Value>>()?.to_string())
+    }
+
+    /// Factors on uncertainties by parameter, as JSON; `None` where there are none.
+    pub fn sigma_factors(&self) -> Option<String> {
+        let value = |one: &Quantity| Some((one.name.clone(), Value::from(one.sigma_factor?)));
+        let factors: Map<String, Value> = self.parameters.iter().filter_map(value).collect();
+        (!factors.is_empty()).then(|| Value::from(factors).to_string())
+    }
+
+    /// What to know before the draws are used.
+    pub fn notes(&self) -> Vec<String> {
+        let unsettled = "the chain has not converged, `dimcmc analyse` says what to do".to_owned();
+        let of = |one: &Quantity| Some(format!("{} by {}", one.name, one.sigma_factor?));
+        let factors: Vec<String> = self.parameters.iter().filter_map(of).collect();
+        let factors = (!factors.is_empty()).then(|| {
+            format!(
+                "multiply the scatter of the draws for quoted uncertainties as summary.json does: {}",
+                factors.join(", ")
+            )
+        });
+        (!self.summary.converged).then_some(unsettled).into_iter().chain(factors).collect()
     }
 }
 

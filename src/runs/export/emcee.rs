@@ -115,6 +115,8 @@ fn attributes(contents: &Contents) -> hdf5_writer::Result<Vec<AttributeBuilder>>
         ("config_sha256", contents.config_sha256.clone()),
     ];
     let injected = contents.injected().map(|text| ("injected", text));
-    attributes.extend(texts.into_iter().chain(injected).map(|(name, text)| AttributeBuilder::fixed_string(name, text)));
+    let factors = contents.sigma_factors().map(|text| ("sigma_factors", text));
+    let texts = texts.into_iter().chain(injected).chain(factors);
+    attributes.extend(texts.map(|(name, text)| AttributeBuilder::fixed_string(name, text)));
     Ok(attributes)
 }

@@ -93,6 +93,9 @@ fn posterior(contents: &Contents, draws: &Draws) -> Group {
         if let Some(injected) = one.injected {
             attributes.insert("injected".to_owned(), json!(injected));
         }
+        if let Some(factor) = one.sigma_factor {
+            attributes.insert("sigma_factor".to_owned(), json!(factor));
+        }
         if let Some(centre) = one.centre {
             attributes.insert("period".to_owned(), json!(1.0));
             attributes.insert("unwrapped_around".to_owned(), json!(centre));
