@@ -5,7 +5,7 @@ use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrio
 use crate::planets::periodogram::Jitters;
 use crate::planets::periodogram::eccentric::LARGEST_ECCENTRICITY;
 use crate::planets::speeds::Speeds;
-use crate::planets::verdict::{decimals, probability, speed};
+use crate::planets::verdict::{decimals, probability};
 use serde::{Deserialize, Serialize};
 
 /// A prior of K counts as wide if it reaches this many times farther than the standard error of K.
@@ -92,12 +92,8 @@ impl EvidenceRecord {
             let digits = decimals(0.5 * best.period_d.powi(2) / time_base_d);
             format!("; false inclusion probability {chance} at P = {:.digits$} d", best.period_d)
         });
-        let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
-            format!(
-                " The prior of K is far wider than σ_K ≈ {}, which lowers all ln Bayes factors: narrow it.",
-                speed(error_kms, error_kms)
-            )
-        });
+        let wide = (one.k.1[1] > WIDE * error_kms)
+            .then_some(" The prior of K is far wider than σ_K, which lowers all ln Bayes factors: narrow it.");
         let sentence = format!(
             "ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (not used in the \
             verdict). Priors: {priors}.{}",
