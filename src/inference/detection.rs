@@ -247,10 +247,9 @@ impl Detection {
         if !known.planets.is_empty() {
             known.write(&mut at.values);
         }
-        let has_scatter = |without: &WithoutJitter| without.found_kms > 0.0 || blind.false_alarm.night_kms > 0.0;
-        let best = match without_jitter.as_ref().is_some_and(has_scatter) {
-            false => blind.best().orbit.delta_ln_l,
-            true => highest(&known.beside(&planet_free.quadratic), &frequencies),
+        let best = match &without_jitter {
+            None => blind.best().orbit.delta_ln_l,
+            Some(_) => highest(&known.beside(&planet_free.quadratic), &frequencies),
         };
         let offset = offset(&known.beside(&planet_free.quadratic), &frequencies.per_cycle, best);
         report(Stage::Change);

@@ -84,7 +84,7 @@ const OVERSAMPLING: f64 = 60.0;
 /// Most frequencies.
 const MOST_FREQUENCIES: usize = 40_000;
 
-/// Draws per repetition at a single jitter, fewest of several in units of these, and number of repetitions.
+/// Draws per repetition: in all, and fewest at one of several jitters in units of these; number of repetitions.
 const DRAWS: usize = 4000;
 const FEWEST: f64 = 0.1;
 const REPETITIONS: usize = 8;
@@ -107,29 +107,40 @@ pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Opti
     let circles: Vec<f64> = weights.iter().zip(&ones).map(|(weight, one)| weight + one.ln_z).collect();
     let highest = circles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let counting: Vec<usize> = (0..ones.len()).filter(|k| circles[*k] > highest - NEGLIGIBLE).collect();
-    let total = ln_sum(&circles);
-    let draws = |k: usize| (DRAWS as f64 * (circles[k] - total).exp().max(FEWEST)).ceil() as usize;
-    let of_level = |k: &usize| OfLevel::new(quadratics[*k], (&ones[*k], draws(*k)), priors);
+    let of_level = |k: &usize| OfLevel::new(quadratics[*k], &ones[*k], priors);
     let levels: Vec<OfLevel> = counting.iter().map(of_level).collect::<Option<_>>()?;
-    let mix = |estimate: &dyn Fn(&OfLevel, &VelocityQuadratic) -> LnBayes| {
-        let of = |(k, level): (&usize, &OfLevel)| (weights[*k] - alone, estimate(level, quadratics[*k]));
-        mixed(&counting.iter().zip(&levels).map(of).collect::<Vec<_>>())
+    let mix = |seed: u64, ln_z: &[f64], estimate: &Estimate| {
+        let draws = shared(ln_z);
+        let of = |(j, k): (usize, &usize)| {
+            (weights[*k] - alone, repeated((seed, *k), |rng| estimate(quadratics[*k], &levels[j], draws[j], rng)))
+        };
+        mixed(&counting.iter().enumerate().map(of).collect::<Vec<_>>())
     };
-    let ellipse = mix(&|of, quadratic| {
-        let circle = (of.one, of.draws);
-        repeated(seed, |rng| ellipse(quadratic, priors[0], circle, rng))
+    let of_one: Vec<f64> = counting.iter().map(|k| circles[*k]).collect();
+    let second = |level: &OfLevel| level.beside.as_ref().map_or(0.0, |beside| beside.ln_z);
+    let of_two: Vec<f64> = of_one.iter().zip(&levels).map(|(one, level)| one + second(level)).collect();
+    let ellipse = mix(seed, &of_one, &|quadratic, of, draws, rng| ellipse(quadratic, priors[0], (of.one, draws), rng));
+    let two_circles = mix(seed.wrapping_add(1), &of_two, &|quadratic, of, draws, rng| {
+        two_circles(quadratic, priors, (&of.pairs(), draws), rng)
     });
-    let two_circles = mix(&|of, quadratic| {
-        let pairs = of.pairs();
-        repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, (&pairs, of.draws), rng))
-    });
-    let circle = LnBayes { ln_bayes: total - alone, sd: None };
+    let circle = LnBayes { ln_bayes: ln_sum(&circles) - alone, sd: None };
     Some(Evidence { circle, ellipse, two_circles, inclusion: Periodogram::mixed(&weights, &ones).inclusion() })
 }
+
+/// An estimate of ln Z at one jitter by so many draws.
+type Estimate<'a> = dyn Fn(&VelocityQuadratic, &OfLevel, usize, &mut ChaCha8Rng) -> f64 + Sync + 'a;
 
 /// Jitters whose one-planet evidence is lower than that of the best jitter by more than this (ln) are left out of the
 /// Monte Carlo estimates.
 const NEGLIGIBLE: f64 = 8.0;
+
+/// Draws per repetition at jitters of that evidence (ln).
+fn shared(ln_z: &[f64]) -> Vec<usize> {
+    let total = ln_sum(ln_z);
+    // an even number: two circles are drawn by turns from two distributions
+    let of = |ln: &f64| 2 * (0.5 * DRAWS as f64 * (ln - total).exp().max(FEWEST)).ceil() as usize;
+    ln_z.iter().map(of).collect()
+}
 
 /// The mean of Bayes factors with weights given as logarithms.
 fn mixed(parts: &[(f64, LnBayes)]) -> LnBayes {
@@ -144,8 +155,6 @@ fn mixed(parts: &[(f64, LnBayes)]) -> LnBayes {
 struct OfLevel<'a> {
     /// One planet.
     one: &'a Periodogram,
-    /// Draws per repetition: as many as the jitter has a share in the evidence of one planet.
-    draws: usize,
     /// The second with the first at its best, and vice versa.
     beside: Option<Periodogram>,
     other: Periodogram,
@@ -153,16 +162,12 @@ struct OfLevel<'a> {
 }
 
 impl<'a> OfLevel<'a> {
-    fn new(
-        quadratic: &VelocityQuadratic,
-        (one, draws): (&'a Periodogram, usize),
-        priors: [&PlanetPrior; 2],
-    ) -> Option<Self> {
+    fn new(quadratic: &VelocityQuadratic, one: &'a Periodogram, priors: [&PlanetPrior; 2]) -> Option<Self> {
         let rest = |best: &Periodogram, prior: &PlanetPrior| {
             without(quadratic, best.frequency(best.best())).and_then(|rest| Periodogram::new(&rest, prior))
         };
         let other = Periodogram::new(quadratic, priors[1])?;
-        Some(OfLevel { beside: rest(one, priors[1]), before: rest(&other, priors[0]), one, draws, other })
+        Some(OfLevel { beside: rest(one, priors[1]), before: rest(&other, priors[0]), one, other })
     }
 
     fn pairs(&self) -> Vec<[&Periodogram; 2]> {
@@ -171,11 +176,11 @@ impl<'a> OfLevel<'a> {
     }
 }
 
-/// The mean of independent estimates of a marginal likelihood, given as logarithms.
-fn repeated(seed: u64, estimate: impl Fn(&mut ChaCha8Rng) -> f64 + Sync) -> LnBayes {
+/// The mean of independent estimates of a marginal likelihood at that jitter, given as logarithms.
+fn repeated((seed, jitter): (u64, usize), estimate: impl Fn(&mut ChaCha8Rng) -> f64 + Sync) -> LnBayes {
     let one = |k: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(k as u64);
+        rng.set_stream((REPETITIONS * jitter + k) as u64);
         estimate(&mut rng)
     };
     let all: Vec<f64> = (0..REPETITIONS).into_par_iter().map(one).collect();

@@ -90,6 +90,14 @@ impl WithoutJitter {
         with_noise(velocities, self.nights.as_ref()?, noise)
     }
 
+    /// With the jitter that was found, and parts of it, only: none where none was found.
+    pub fn beside_found(&self, quadratic: &VelocityQuadratic) -> Jitters {
+        match self.found_kms > 0.0 {
+            true => Jitters::in_units(quadratic, (self.found_kms, self.found_kms), self.scale_kms),
+            false => Jitters::none(quadratic),
+        }
+    }
+
     /// With jitters of several sizes only.
     pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
         Jitters::new(quadratic, self.found_kms, self.scale_kms)

@@ -68,7 +68,7 @@ impl KnownPlanets {
             // with a single planet, the star itself
             ([_, _, ..], Some(without)) => {
                 let rest = beside(others(ephemerides, ephemeris), &without.here.quadratic);
-                without.beside_jitter(&rest).as_found().quadratic.clone()
+                without.beside_found(&rest).as_found().quadratic.clone()
             }
             _ => beside(others(ephemerides, ephemeris), &here.quadratic).into_owned(),
         })

@@ -137,12 +137,13 @@ pub fn robustness(
     let of_all = match (&found.without_jitter, tried) {
         (Some(star), Tried::Peak(_)) => star.beside(of_all),
         // the effect of nightly offsets is reported separately
-        (Some(star), Tried::Known(_)) => star.beside_jitter(of_all),
+        (Some(star), Tried::Known(_)) => star.beside_found(of_all),
         (None, _) => Jitters::none(of_all),
     };
-    let jitters = |quadratic: &VelocityQuadratic| match &found.without_jitter {
-        Some(star) => star.of_some_beside(quadratic, &of_all),
-        None => Jitters::none(quadratic),
+    let jitters = |quadratic: &VelocityQuadratic| match (&found.without_jitter, tried) {
+        (Some(star), Tried::Peak(_)) => star.of_some_beside(quadratic, &of_all),
+        (Some(star), Tried::Known(_)) => star.beside_found(quadratic),
+        (None, _) => Jitters::none(quadratic),
     };
     let blind = |quadratic: &VelocityQuadratic| match &found.without_jitter {
         Some(_) => tried.beside(found, quadratic, &jitters),

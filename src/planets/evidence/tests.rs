@@ -99,7 +99,7 @@ fn an_ellipse_is_the_sum_over_all_its_parameters() {
     let (periods, largest_e) = ([1.65, 1.75], 0.6);
     let found = with_priors([periods; 2], largest_e, |[prior, _]| {
         let circle = Periodogram::new(&quadratic, prior).unwrap();
-        repeated(1, |rng| ellipse(&quadratic, prior, (&circle, DRAWS), rng))
+        repeated((1, 0), |rng| ellipse(&quadratic, prior, (&circle, DRAWS), rng))
     });
     let mut terms = Vec::new();
     for period in cells(4, periods) {

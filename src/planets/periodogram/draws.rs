@@ -46,29 +46,25 @@ fn heights(
 ) -> Vec<f64> {
     // from deviates to the gradient, symmetric
     let root = root(&jitters.covariance);
-    let rows: Vec<DMatrix<f64>> = jitters.levels.iter().map(|level| rows(level, &root)).collect();
-    let alone: Vec<DMatrix<f64>> = jitters.levels.iter().map(|level| &level.solved * &root).collect();
-    let profiles = root.nrows();
-    let block = |block: usize| {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(block as u64);
-        let size = DRAWS.min(draws - block * DRAWS);
-        let deviates = DMatrix::from_fn(profiles, size, |_, _| rng.sample::<f64, _>(StandardNormal));
-        if jitters.is_none() {
-            return of(&rows[0], &deviates);
-        }
-        let (mut without, mut with) = (vec![f64::NEG_INFINITY; size], vec![f64::NEG_INFINITY; size]);
-        for (level, (rows, alone)) in jitters.levels.iter().zip(rows.iter().zip(&alone)) {
-            let amplitudes = alone * &deviates;
-            for (k, highest) in of(rows, &deviates).into_iter().enumerate() {
+    let (mut without, mut with) = (vec![f64::NEG_INFINITY; draws], vec![f64::NEG_INFINITY; draws]);
+    // the rows of one level at a time: those of sixteen would take a gigabyte for several hundred profiles
+    for level in &jitters.levels {
+        let (rows, alone) = (rows(level, &root), &level.solved * &root);
+        let of_block = |(block, (without, with)): (usize, (&mut [f64], &mut [f64]))| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(block as u64);
+            let deviates = DMatrix::from_fn(root.nrows(), with.len(), |_, _| rng.sample::<f64, _>(StandardNormal));
+            let amplitudes = &alone * &deviates;
+            for (k, highest) in of(&rows, &deviates).into_iter().enumerate() {
                 let alone = level.constant + 0.5 * amplitudes.column(k).norm_squared();
                 without[k] = without[k].max(alone);
                 with[k] = with[k].max(alone + highest);
             }
-        }
-        with.iter().zip(&without).map(|(with, without)| with - without).collect()
-    };
-    (0..draws.div_ceil(DRAWS)).into_par_iter().flat_map_iter(block).collect()
+        };
+        let blocks = without.par_chunks_mut(DRAWS).zip(with.par_chunks_mut(DRAWS));
+        blocks.enumerate().for_each(of_block);
+    }
+    with.iter().zip(&without).map(|(with, without)| with - without).collect()
 }
 
 /// The highest Delta ln L of each column of deviates.

@@ -154,7 +154,8 @@ impl<'a> Injections<'a> {
             let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
             // without offsets in the model a jitter absorbs them
             let of_nights = |nights: &Nights| {
-                let units = nights.units(velocities, size.scatter, jitter_kms.hypot(night_kms));
+                let most_kms = Reach::Stable.most_kms(field.scale_kms);
+                let units = nights.units(velocities, size.scatter, (jitter_kms.hypot(night_kms), most_kms));
                 beside(velocities, nights, (size.scatter, units), field.scale_kms, Reach::Stable)
             };
             let of_offsets = || field.nights.as_ref().and_then(of_nights);
@@ -291,11 +292,7 @@ impl Column<'_, '_> {
         let (of, field) = (&self.fields[field], &self.all.fields[field]);
         let alone = field.alone(of, ab);
         let best_alone = largest(&alone)?;
-        // offsets that the velocities do not need without an orbit are not needed with it, either
-        let has_offsets = |size: usize| field.sizes[size].scatter.night_kms > 0.0;
-        let is_tried = |size: &usize| has_offsets(best_alone) || !has_offsets(*size);
-        let of_orbit = |size: usize| if is_tried(&size) { sum(&of.whitened[size], ab) } else { DVector::zeros(0) };
-        let whitened: Vec<DVector<f64>> = (0..alone.len()).map(of_orbit).collect();
+        let whitened: Vec<DVector<f64>> = of.whitened.iter().map(|parts| sum(parts, ab)).collect();
         let height = |size: usize, trial: usize| {
             let amplitudes = whitened[size].as_slice();
             0.5 * (amplitudes[2 * trial].powi(2) + amplitudes[2 * trial + 1].powi(2))
@@ -303,7 +300,7 @@ impl Column<'_, '_> {
         let bounded = |size: usize, trial: usize| field.sizes[size].factors[trial] != UNBOUNDED;
         let frequencies = &self.all.frequencies.per_cycle;
         let of_size = |size: usize| (0..frequencies.len()).map(move |trial| (size, trial));
-        let all = (0..alone.len()).filter(is_tried).flat_map(of_size).filter(|&(size, trial)| bounded(size, trial));
+        let all = (0..alone.len()).flat_map(of_size).filter(|&(size, trial)| bounded(size, trial));
         let total = |&(size, trial): &(usize, usize)| alone[size] + height(size, trial);
         let best @ (size, trial) = all.max_by(|a, b| total(a).total_cmp(&total(b)))?;
         let [a, b] = [whitened[size][2 * trial], whitened[size][2 * trial + 1]];

@@ -11,7 +11,7 @@ use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 
 /// Trial jitters, in units of the one found without a planet, or that chance mimics.
-const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, std::f64::consts::SQRT_2];
+pub(super) const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, std::f64::consts::SQRT_2];
 
 /// By how many of its standard errors a variance exceeds 0 by chance.
 const BY_CHANCE: f64 = 2.0;
@@ -32,12 +32,11 @@ pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
     if last == 0 { vec![0.0] } else { (0..=last).map(|k| share(k).ln()).collect() }
 }
 
-/// The standard deviation (km/s) of offsets of so many groups of profiles that chance mimics where there are none: with
-/// profiles of equal errors, a variance of `sqrt(2 / groups)` times that of a group's mean is one standard error.
-pub(super) fn by_chance_kms(without: &VelocityQuadratic, groups: usize) -> f64 {
-    let groups = groups as f64;
-    let mean_variance = groups / without.information.trace();
-    (BY_CHANCE * mean_variance * (2.0 / groups).sqrt()).sqrt()
+/// The standard deviation (km/s) of offsets that chance mimics where there are none, given the information on them: the
+/// standard error of their variance is `sqrt(2 / tr(information^2))`. 0 without information.
+pub(super) fn by_chance_kms(information: &DMatrix<f64>) -> f64 {
+    let norm = information.norm();
+    if norm > 0.0 { (BY_CHANCE * std::f64::consts::SQRT_2 / norm).sqrt() } else { 0.0 }
 }
 
 /// Standard deviations (km/s) of jitter and nightly offsets.
@@ -116,11 +115,11 @@ impl Jitters {
     /// Jitters added to the quadratic `without` one; `found_kms` is the standard deviation (km/s) found without a
     /// planet; with the [`ln_prior`] of a scale.
     pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: Option<f64>) -> Self {
-        let unit_kms = found_kms.max(by_chance_kms(without, without.len()));
+        let unit_kms = found_kms.max(by_chance_kms(&without.information));
         Jitters::in_units(without, (found_kms, unit_kms), scale_kms)
     }
 
-    /// The same with trial jitters in this unit (km/s).
+    /// The same with trial jitters in `unit_kms`.
     pub fn in_units(without: &VelocityQuadratic, (found_kms, unit_kms): (f64, f64), scale_kms: Option<f64>) -> Self {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);

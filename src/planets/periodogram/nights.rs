@@ -8,21 +8,22 @@
 //! values that are the most likely without one, and are searched in the same way, also where these are 0.
 
 use super::draws::amplitudes;
-use super::jitter::{Jitters, Level, Scatter, by_chance_kms, ln_prior, ln_shares};
+use super::jitter::{Jitters, Level, SIZES, Scatter, by_chance_kms, ln_prior, ln_shares};
 use super::{FalseAlarm, Frequencies, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Trial jitters, in units of the one found without offsets, or with each orbit that chance mimics.
+/// Trial jitters for the most likely one, in units of the one found without offsets.
 const JITTERS: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 
 /// Trial offsets for the most likely one, in units of the rms of the velocities: first, last, and ratio, within the
 /// [`Reach`].
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
-/// Trial offsets with each orbit, in units of the most likely one, or that chance mimics.
+/// Trial offsets with each orbit, in units of those found without one, or that chance mimics; jitters are as without
+/// offsets.
 const PARTS: [f64; 4] = [0.0, 0.5, 1.0, 1.4];
 
 /// Default stability of a spectrograph (km/s): that of ESPaDOnS and Narval.
@@ -80,11 +81,17 @@ impl Nights {
     }
 
     /// Units of trial sizes beside orbits, where the jitter is `found_kms` without offsets and stars without a planet
-    /// have the noise `null`: that, or what chance mimics.
-    pub(super) fn units(&self, without: &VelocityQuadratic, null: Scatter, found_kms: f64) -> Scatter {
+    /// have the noise `null`: that, or what chance mimics; offsets go up to `most_kms`.
+    pub(super) fn units(
+        &self,
+        without: &VelocityQuadratic,
+        null: Scatter,
+        (found_kms, most_kms): (f64, f64),
+    ) -> Scatter {
+        let of_nights = self.0.tr_mul(&(&without.information * &self.0));
         Scatter {
-            jitter_kms: found_kms.max(by_chance_kms(without, without.len())),
-            night_kms: null.night_kms.max(by_chance_kms(without, self.0.ncols())),
+            jitter_kms: found_kms.max(by_chance_kms(&without.information)),
+            night_kms: null.night_kms.max(by_chance_kms(&of_nights)).min(most_kms / PARTS[PARTS.len() - 1]),
         }
     }
 
@@ -115,7 +122,8 @@ pub fn beside_offsets(
     reach: Reach,
 ) -> Option<(Jitters, Offsets)> {
     let (null, gain) = most_likely(without, nights, (found_kms, scale_kms), reach)?;
-    let all = beside(without, nights, (null, nights.units(without, null, found_kms)), scale_kms, reach)?;
+    let units = nights.units(without, null, (found_kms, reach.most_kms(scale_kms)));
+    let all = beside(without, nights, (null, units), scale_kms, reach)?;
     Some((all, Offsets { sigma_kms: null.night_kms, gain }))
 }
 
@@ -136,7 +144,8 @@ pub fn most_likely(
         size *= factor;
     }
     let sizes = reach.of(&sizes, scale_kms);
-    let tried = scatters(&jitters(found_kms), &sizes);
+    let jitters = if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] };
+    let tried = scatters(&jitters, &sizes);
     let of = |one: &Scatter| Beside::new(without, nights, *one, (scale_kms, reach));
     let height = |one: &Scatter| of(one).map_or(f64::NEG_INFINITY, |of| of.height);
     let heights: Vec<f64> = tried.par_iter().map(height).collect();
@@ -166,8 +175,9 @@ pub(super) fn beside(
     scale_kms: Option<f64>,
     reach: Reach,
 ) -> Option<Jitters> {
-    let offsets = reach.of(&PARTS.map(|part| part * units.night_kms), scale_kms);
-    let jitters = jitters(units.jitter_kms);
+    let jitters = SIZES.map(|size| size * units.jitter_kms);
+    let mut offsets = PARTS.map(|part| part * units.night_kms).to_vec();
+    offsets.dedup();
     let of = |one: Scatter| Beside::new(without, nights, one, (scale_kms, reach));
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
     let of_jitter = ln_shares(&jitters);
@@ -245,11 +255,6 @@ impl Reach {
             Reach::Any => ln_prior(night_kms, scale_kms.or(Some(USUAL_KMS))),
         }
     }
-}
-
-/// Trial jitters where the jitter is `found_kms` without offsets.
-fn jitters(found_kms: f64) -> Vec<f64> {
-    if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] }
 }
 
 /// Each of the jitters with each of the offsets.

@@ -56,12 +56,9 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
             let beside = |scatter| Beside::new(&moved, &nights, scatter, (None, Reach::Stable)).unwrap();
             let of = |size: &Size| (size.scatter, beside(size.scatter));
             let all: Vec<(Scatter, Beside)> = injections.fields[0].sizes.iter().map(of).collect();
-            let (null, alone) = all.iter().max_by(|a, b| a.1.height.total_cmp(&b.1.height)).unwrap();
+            let (_, alone) = all.iter().max_by(|a, b| a.1.height.total_cmp(&b.1.height)).unwrap();
             let mut with = (f64::NEG_INFINITY, 0.0);
-            for (scatter, beside) in &all {
-                if scatter.night_kms > 0.0 && null.night_kms == 0.0 {
-                    continue;
-                }
+            for (_, beside) in &all {
                 let left = beside.kept();
                 let here = VelocityQuadratic {
                     gradient: &left * &moved.gradient,

@@ -86,7 +86,7 @@ fn stars_without_offsets_are_searched_like_those_that_are_drawn() {
     let frequencies = Frequencies::new(&of(0.0, 0.0, 0.0, 0).0.cycles, 1.0, FrequencySettings::default()).unwrap();
     let of_star = |seed: u64| {
         let velocities = of(0.0, 0.0, 0.0, seed).0;
-        let units = nights.units(&velocities, zero, 0.0);
+        let units = nights.units(&velocities, zero, (0.0, Reach::Stable.most_kms(None)));
         (beside(&velocities, &nights, (zero, units), None, Reach::Stable).unwrap(), velocities)
     };
     let (first, velocities) = of_star(0);
