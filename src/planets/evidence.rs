@@ -137,7 +137,7 @@ const NEGLIGIBLE: f64 = 8.0;
 /// Draws per repetition at jitters of that evidence (ln).
 fn shared(ln_z: &[f64]) -> Vec<usize> {
     let total = ln_sum(ln_z);
-    // an even number: two circles are drawn by turns from two distributions
+    // an even number: two orbits are drawn by turns from two distributions
     let of = |ln: &f64| 2 * (0.5 * DRAWS as f64 * (ln - total).exp().max(FEWEST)).ceil() as usize;
     ln_z.iter().map(of).collect()
 }
