@@ -191,6 +191,15 @@ pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) 
     Some(Beside::new(without, nights, noise, (None, Reach::Stable))?.likelihood(without))
 }
 
+/// The same with offsets of any size. `None` where zero offsets are the most likely without a planet.
+fn beside_needed(
+    without: &VelocityQuadratic,
+    nights: &Nights,
+    jitter: (f64, Option<f64>),
+) -> Option<(Jitters, Offsets)> {
+    beside_offsets(without, nights, jitter, Reach::Any).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
+}
+
 /// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).
 /// `None` where zero offsets are the most likely without a planet.
 pub fn peak_beside_offsets(
@@ -200,10 +209,7 @@ pub fn peak_beside_offsets(
     (frequency, frequencies): (f64, &Frequencies),
     SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
-    let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter, Reach::Any)?;
-    if sigma_kms == 0.0 {
-        return None;
-    }
+    let (all, Offsets { sigma_kms, gain }) = beside_needed(without, nights, jitter)?;
     let height = all.orbit_at(frequency)?.delta_ln_l;
     let alarm = FalseAlarm::draw(&all, &frequencies.per_cycle, DRAWS.min(draws), seed);
     Some(NightOffsets { sigma_kms, gain, false_alarm_probability: alarm.probability(height).value() })
@@ -217,10 +223,7 @@ pub fn known_beside_offsets(
     unit: &DVector<f64>,
     SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
-    let (all, Offsets { sigma_kms, gain }) = beside_offsets(without, nights, jitter, Reach::Any)?;
-    if sigma_kms == 0.0 {
-        return None;
-    }
+    let (all, Offsets { sigma_kms, gain }) = beside_needed(without, nights, jitter)?;
     let (height, draws) = (all.height_above_zero(unit), DRAWS.min(draws));
     let above = amplitudes(&all, unit, draws, seed).into_iter().filter(|drawn| *drawn >= height).count();
     Some(NightOffsets { sigma_kms, gain, false_alarm_probability: (1 + above) as f64 / (1 + draws) as f64 })
