@@ -47,7 +47,7 @@ fn heights(
     // from deviates to the gradient, symmetric
     let root = root(&jitters.covariance);
     let (mut without, mut with) = (vec![f64::NEG_INFINITY; draws], vec![f64::NEG_INFINITY; draws]);
-    // the rows of one level at a time: those of sixteen would take a gigabyte for several hundred profiles
+    // the rows of one level at a time: those of all take a gigabyte for 400 profiles
     for level in &jitters.levels {
         let (rows, alone) = (rows(level, &root), &level.solved * &root);
         let of_block = |(block, (without, with)): (usize, (&mut [f64], &mut [f64]))| {

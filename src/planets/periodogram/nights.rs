@@ -180,7 +180,7 @@ pub(super) fn beside(
     offsets.dedup();
     let of = |one: Scatter| Beside::new(without, nights, one, (scale_kms, reach));
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
-    let of_jitter = ln_shares(&jitters);
+    let of_jitter = ln_shares(&SIZES);
     let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
     let (levels, covariance) = levels(without, &of(null)?, all?);
     Some(Jitters { levels, ln_shares: shares.collect(), null: Some(null), units, covariance })
