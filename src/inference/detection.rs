@@ -201,14 +201,13 @@ impl PlanetFree {
         let jitters = none.jitters(&here, without_jitter.as_ref());
         let known = KnownPlanets::absent(&settings.known, &here, without_jitter.as_ref());
         known.write(&mut at.values);
-        let here = known.whole(surface.linearise(at, Some(&here))?, &at.values);
-        let with_known = surface.without_jitter(at, &here)?;
-        let known = known.clone().present(&known.noisy(&here, with_known.as_ref(), &at.values));
+        let here = surface.linearise(at, Some(&here))?;
         let found = PlanetFree::of(surface, at, (here, known), frequencies, settings.search, report)?;
-        Ok(PlanetFree { alone: Some(Alone { jitters, without_jitter }), ..found })
+        let known = found.known.clone().present(&found.known.noisy(&found.here, found.without_jitter.as_ref()));
+        Ok(PlanetFree { known, alone: Some(Alone { jitters, without_jitter }), ..found })
     }
 
-    /// The state of the star in `at`, linearised `here`, with only the orbits of `known` planets.
+    /// The state of the star in `at`, linearised `here` by the surface model, with only the orbits of `known` planets.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -221,7 +220,9 @@ impl PlanetFree {
         report: &dyn Fn(Stage),
     ) -> Result<Self, SurfaceError> {
         report(Stage::Search);
-        let without_jitter = surface.without_jitter(at, &here)?;
+        let whole = |star: WithoutJitter| WithoutJitter { here: known.whole(star.here, &at.values), ..star };
+        let without_jitter = surface.without_jitter(at, &here)?.map(whole);
+        let here = known.whole(here, &at.values);
         let jitters = known.jitters(&here, without_jitter.as_ref());
         let blind = imitated(surface, Search::with_jitter(&jitters, frequencies, settings)?);
         Ok(PlanetFree { known, alone: None, here, without_jitter, blind })
@@ -276,7 +277,7 @@ impl Detection {
         if !found.known.planets.is_empty() && found.is_candidate() && found.known.companion.is_none() {
             let frequency = 1.0 / found.blind.best().porb_over_prot;
             let known = found.known.with_companion(frequency);
-            let noisy = known.noisy(&found.planet_free, found.without_jitter.as_ref(), &at.values);
+            let noisy = known.noisy(&found.planet_free, found.without_jitter.as_ref());
             found.known = known.clone().present(&noisy);
         }
         match found.known.first().map(KnownPlanet::peak) {

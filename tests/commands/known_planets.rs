@@ -88,6 +88,22 @@ fn two_known_planets_are_judged_together_and_a_third_is_found_beside_them() {
     assert!((number(&first["k_kms"]) - K_KMS[1]).abs() < 4.0 * number(&first["sigma_k_kms"]), "{first}");
 }
 
+/// Offsets of nights that chance mimics beside both planets: K of the second is counted once.
+#[test]
+fn offsets_of_nights_leave_two_known_planets_as_they_are() {
+    let mut star = config();
+    let simulate = &mut star["observations"]["simulate"];
+    (simulate["seed"], simulate["random_spots"]["seed"]) = (json!(10), json!(10));
+    let desk = Desk::new(star);
+    desk.succeed(&["periodogram", "config.json", "--draws", "1000", "--out", "search"]);
+    let file = desk.json("search/periodogram.json");
+    assert!(number(&file["false_alarm"]["night_offsets_kms"]) > 0.0, "no offsets");
+    for (planet, of) in file["known_planets"].as_array().unwrap().iter().zip(K_KMS) {
+        let [k_kms, sigma] = ["k_kms", "sigma_k_kms"].map(|key| number(&planet["orbit"][key]));
+        assert!((k_kms - of).abs() < 3.0 * sigma && sigma < 0.05, "{k_kms} +- {sigma}");
+    }
+}
+
 /// RV offsets from night to night, by chance larger where the planet would be receding.
 #[test]
 fn a_known_planet_is_compared_with_offsets_of_nights() {

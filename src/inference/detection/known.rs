@@ -97,20 +97,19 @@ impl KnownPlanets {
         self
     }
 
-    /// Velocities of the star `here` with them, at `values`, with the RV offsets of nights that are the most likely
-    /// beside them, if any are needed.
+    /// Velocities of the star `here` with them, with the RV offsets of nights that are the most likely beside them, if
+    /// any are needed; both stars with their full velocities ([`KnownPlanets::whole`]).
     pub fn noisy<'a>(
         &self,
         here: &'a Linearised,
         without_jitter: Option<&WithoutJitter>,
-        values: &ParameterValues,
     ) -> Cow<'a, VelocityQuadratic> {
         let noisy = without_jitter.filter(|star| star.nights.is_some()).and_then(|star| {
-            let velocities = self.whole(star.here.clone(), values).quadratic;
-            let rest = self.beside(&velocities);
+            let velocities = &star.here.quadratic;
+            let rest = self.beside(velocities);
             let beside_companion = self.companion.and_then(|at| without(&rest, at));
             let noise = star.noise(beside_companion.as_ref().unwrap_or(&rest))?;
-            star.with_noise(&velocities, noise).filter(|_| noise.night_kms > 0.0)
+            star.with_noise(velocities, noise).filter(|_| noise.night_kms > 0.0)
         });
         noisy.map_or(Cow::Borrowed(&here.quadratic), Cow::Owned)
     }
