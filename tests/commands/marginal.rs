@@ -47,7 +47,7 @@ fn an_export_of_a_fast_star_says_what_its_draws_lack() {
     config["parameters"]["inclination_deg"] = json!({ "prior": "isotropic" });
     let desk = Desk::new(config);
     says(&desk.succeed(&["sample", CONFIG, "--out", "run"]), &["inclination_deg are multiplied by 1.6"]);
-    let note = "quoted uncertainties as summary.json does: inclination_deg by 1.6";
+    let note = "larger than the scatter of the draws: 1.6 times for inclination_deg";
     says(&desk.succeed(&["export", "run", "--format", "zarr"]), &[note]);
     says(&desk.read("run/chain.zarr/posterior/inclination_deg/zarr.json"), &["\"sigma_factor\": 1.6"]);
     assert!(!desk.read("run/chain.zarr/posterior/k_kms/zarr.json").contains("sigma_factor"));

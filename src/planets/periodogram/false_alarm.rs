@@ -3,8 +3,8 @@
 //! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 -
 //! exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the
 //! upper tail of the draws by maximum likelihood, draws below the tail entering as censored. Where a jitter of unknown
-//! size is fitted with the orbit, high peaks are more frequent, as in the F-test, or less frequent, as where chance
-//! mimics a jitter it takes a part of them: z is multiplied by a rate, which is fitted along with W.
+//! size is fitted with the orbit, high peaks are more frequent, as in the F-test, or less, where a jitter that chance
+//! mimics takes a part of them: z is multiplied by a rate, which is fitted along with W.
 
 use super::draws::maxima;
 use super::jitter::Jitters;

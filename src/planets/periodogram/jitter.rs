@@ -3,8 +3,8 @@
 //! Marginalised over the offsets, `ln L(V)` of information I becomes that of the information `(1 + s^2 I)^-1 I`. A
 //! jitter found without a planet in the model may be due to the planet: with few profiles a strong signal would be
 //! absorbed. So s is fitted both without an orbit and with each orbit, as in the F-test of a periodogram of unknown
-//! noise. Simulated stars without a planet have the jitter found without one, and are searched in the same way: also
-//! where none was found, as in half of them chance mimics one, which lowers their peaks.
+//! noise. Simulated stars without a planet have the jitter found without one, and are searched in the same way,
+//! also where none was found: in half of them chance mimics one, which lowers their peaks.
 
 use super::orbits::{CircularOrbit, Trial, scan};
 use crate::planets::velocities::VelocityQuadratic;

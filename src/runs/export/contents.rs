@@ -157,13 +157,10 @@ impl Contents {
     /// What to know before the draws are used.
     pub fn notes(&self) -> Vec<String> {
         let unsettled = "the chain has not converged, `dimcmc analyse` says what to do".to_owned();
-        let of = |one: &Quantity| Some(format!("{} by {}", one.name, one.sigma_factor?));
+        let of = |one: &Quantity| Some(format!("{} times for {}", one.sigma_factor?, one.name));
         let factors: Vec<String> = self.parameters.iter().filter_map(of).collect();
         let factors = (!factors.is_empty()).then(|| {
-            format!(
-                "multiply the scatter of the draws for quoted uncertainties as summary.json does: {}",
-                factors.join(", ")
-            )
+            format!("uncertainties in summary.json are larger than the scatter of the draws: {}", factors.join(", "))
         });
         (!self.summary.converged).then_some(unsettled).into_iter().chain(factors).collect()
     }
