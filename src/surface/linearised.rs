@@ -6,8 +6,8 @@ use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::Parameter;
 use crate::numerics::json::is_zero;
-use crate::planets::periodogram::nights::{Nights, Reach, beside_offsets, beside_offsets_of, most_likely, with_noise};
-use crate::planets::periodogram::{CircularOrbit, Jitters, Scatter, Unbounded};
+use crate::planets::periodogram::nights::{Nights, beside_offsets, beside_offsets_of, most_likely, with_noise};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Scatter, Unbounded, most_offset_kms};
 use crate::planets::speeds::with_unit;
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::{Remark, decimals};
@@ -67,7 +67,8 @@ impl WithoutJitter {
     /// The likelihood of these velocities of this star with jitters and night offsets of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
         let jitter = (self.found_kms, self.scale_kms);
-        let beside = |nights: &Nights| Some(beside_offsets(quadratic, nights, jitter, Reach::Stable)?.0);
+        let beside =
+            |nights: &Nights| Some(beside_offsets(quadratic, nights, jitter, most_offset_kms(self.scale_kms))?.0);
         self.nights.as_ref().and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
@@ -81,8 +82,8 @@ impl WithoutJitter {
 
     /// The most likely jitter and night offsets of these velocities of this star, in which orbits are left free.
     pub fn noise(&self, velocities: &VelocityQuadratic) -> Option<Scatter> {
-        let found = most_likely(velocities, self.nights.as_ref()?, (self.found_kms, self.scale_kms), Reach::Stable);
-        found.map(|(noise, _)| noise)
+        let (jitter, most_kms) = ((self.found_kms, self.scale_kms), most_offset_kms(self.scale_kms));
+        most_likely(velocities, self.nights.as_ref()?, jitter, most_kms).map(|(noise, _)| noise)
     }
 
     /// The likelihood of these velocities of this star with that noise.

@@ -11,7 +11,7 @@
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
 use super::jitter::{Jitters, Scatter};
-use super::nights::{Beside, Nights, Reach, beside, scatters};
+use super::nights::{Beside, Nights, beside, most_offset_kms, scatters, within};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::numerics::once;
@@ -154,9 +154,9 @@ impl<'a> Injections<'a> {
             let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
             // without offsets in the model a jitter absorbs them
             let of_nights = |nights: &Nights| {
-                let most_kms = Reach::Stable.most_kms(field.scale_kms);
+                let most_kms = most_offset_kms(field.scale_kms);
                 let units = nights.units(velocities, size.scatter, (jitter_kms.hypot(night_kms), most_kms));
-                beside(velocities, nights, (size.scatter, units), field.scale_kms, Reach::Stable)
+                beside(velocities, nights, (size.scatter, units), field.scale_kms)
             };
             let of_offsets = || field.nights.as_ref().and_then(of_nights);
             let jitters = match field.is_known {
@@ -186,14 +186,14 @@ impl<'a> Field<'a> {
             Jitter::Known => (None, None, scatters(&[0.0], &[0.0])),
             Jitter::Fitted(scale_kms, None) => (*scale_kms, None, scatters(&sizes(STEP, most_kms), &[0.0])),
             Jitter::Fitted(scale_kms, nights) => {
-                let offsets = sizes(STEP_OF_OFFSETS, Reach::Stable.most_kms(*scale_kms));
-                let offsets = Reach::Stable.of(&offsets, *scale_kms);
+                let most_kms = most_offset_kms(*scale_kms);
+                let offsets = within(&sizes(STEP_OF_OFFSETS, most_kms), most_kms);
                 (*scale_kms, nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
             }
         };
         let of_all = nights.clone().unwrap_or_else(|| Nights::none(velocities.len()));
         let size = |scatter: &Scatter| {
-            let beside = Beside::new(velocities, &of_all, *scatter, (scale_kms, Reach::Stable))?;
+            let beside = Beside::new(velocities, &of_all, *scatter, scale_kms)?;
             Some(Size::new(*scatter, &beside, velocities, frequencies))
         };
         let sizes = scatters.par_iter().filter_map(size).collect();

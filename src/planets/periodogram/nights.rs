@@ -4,8 +4,9 @@
 //! profile and offsets t of the nights have the covariance `J = L L'` with `L = [s 1 | t N]`, N assigning profiles to
 //! nights. With it ln L of information I and gradient g has the information `I - I M I` and the gradient `(1 - I M) g`,
 //! `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As for a jitter
-//! alone (`jitter`), s and t are fitted without an orbit and with each orbit. Simulated stars without a planet have the
-//! values that are the most likely without one, and are searched in the same way, also where these are 0.
+//! alone (`jitter`), s and t are fitted without an orbit and with each orbit, t with the prior of a jitter: half-Cauchy,
+//! its scale the stability of the spectrograph. Simulated stars without a planet have the values that are the most
+//! likely without one, and are searched in the same way, also where these are 0.
 
 use super::draws::amplitudes;
 use super::jitter::{Jitters, Level, SIZES, Scatter, by_chance_kms, ln_prior, ln_shares};
@@ -19,7 +20,7 @@ use serde::{Deserialize, Serialize};
 const JITTERS: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
 
 /// Trial offsets for the most likely one, in units of the rms of the velocities: first, last, and ratio, within the
-/// [`Reach`].
+/// largest that are allowed.
 const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 
 /// Trial offsets with each orbit, in units of those found without one, or that chance mimics; jitters are as without
@@ -47,15 +48,6 @@ pub struct NightOffsets {
     pub gain: f64,
     /// False-alarm probability of the peak, or of K of a known planet, by stars without it that have such offsets.
     pub false_alarm_probability: f64,
-}
-
-/// How large offsets may be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reach {
-    /// Up to twice the stability of the spectrograph, all as probable.
-    Stable,
-    /// Any, with the prior of a jitter: how unstable the spectrograph would have to be.
-    Any,
 }
 
 /// Assignment of profiles to nights.
@@ -114,16 +106,16 @@ pub struct Offsets {
 }
 
 /// The likelihood of the velocities with a jitter, found to be `found_kms` without a planet and with a prior of that
-/// scale, the stability of the spectrograph, and with offsets of `nights` within that `reach`.
+/// scale, the stability of the spectrograph, and with offsets of `nights`, at most `most_kms`.
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
-    (found_kms, scale_kms): (f64, Option<f64>),
-    reach: Reach,
+    jitter @ (found_kms, scale_kms): (f64, Option<f64>),
+    most_kms: f64,
 ) -> Option<(Jitters, Offsets)> {
-    let (null, gain) = most_likely(without, nights, (found_kms, scale_kms), reach)?;
-    let units = nights.units(without, null, (found_kms, reach.most_kms(scale_kms)));
-    let all = beside(without, nights, (null, units), scale_kms, reach)?;
+    let (null, gain) = most_likely(without, nights, jitter, most_kms)?;
+    let units = nights.units(without, null, (found_kms, most_kms));
+    let all = beside(without, nights, (null, units), scale_kms)?;
     Some((all, Offsets { sigma_kms: null.night_kms, gain }))
 }
 
@@ -133,7 +125,7 @@ pub fn most_likely(
     without: &VelocityQuadratic,
     nights: &Nights,
     (found_kms, scale_kms): (f64, Option<f64>),
-    reach: Reach,
+    most_kms: f64,
 ) -> Option<(Scatter, f64)> {
     let error_kms = (without.len() as f64 / without.information.trace()).sqrt();
     let (first, last, factor) = OFFSETS;
@@ -143,10 +135,10 @@ pub fn most_likely(
         sizes.push(size * found_kms.max(error_kms));
         size *= factor;
     }
-    let sizes = reach.of(&sizes, scale_kms);
+    let sizes = within(&sizes, most_kms);
     let jitters = if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] };
     let tried = scatters(&jitters, &sizes);
-    let of = |one: &Scatter| Beside::new(without, nights, *one, (scale_kms, reach));
+    let of = |one: &Scatter| Beside::new(without, nights, *one, scale_kms);
     let height = |one: &Scatter| of(one).map_or(f64::NEG_INFINITY, |of| of.height);
     let heights: Vec<f64> = tried.par_iter().map(height).collect();
     let highest = |with: bool| {
@@ -164,7 +156,7 @@ pub fn beside_offsets_of(
     nights: &Nights,
     scale_kms: Option<f64>,
 ) -> Option<Jitters> {
-    beside(without, nights, (of_all.null?, of_all.units), scale_kms, Reach::Stable)
+    beside(without, nights, (of_all.null?, of_all.units), scale_kms)
 }
 
 /// The same where `null` has the jitter and offsets of stars without a planet; trial sizes are in these units.
@@ -173,12 +165,11 @@ pub(super) fn beside(
     nights: &Nights,
     (null, units): (Scatter, Scatter),
     scale_kms: Option<f64>,
-    reach: Reach,
 ) -> Option<Jitters> {
     let jitters = SIZES.map(|size| size * units.jitter_kms);
     let mut offsets = PARTS.map(|part| part * units.night_kms).to_vec();
     offsets.dedup();
-    let of = |one: Scatter| Beside::new(without, nights, one, (scale_kms, reach));
+    let of = |one: Scatter| Beside::new(without, nights, one, scale_kms);
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
     let of_jitter = ln_shares(&SIZES);
     let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
@@ -188,7 +179,7 @@ pub(super) fn beside(
 
 /// The likelihood of the velocities with this noise, a jitter and offsets of `nights`.
 pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) -> Option<VelocityQuadratic> {
-    Some(Beside::new(without, nights, noise, (None, Reach::Stable))?.likelihood(without))
+    Some(Beside::new(without, nights, noise, None)?.likelihood(without))
 }
 
 /// The same with offsets of any size. `None` where zero offsets are the most likely without a planet.
@@ -197,7 +188,7 @@ fn beside_needed(
     nights: &Nights,
     jitter: (f64, Option<f64>),
 ) -> Option<(Jitters, Offsets)> {
-    beside_offsets(without, nights, jitter, Reach::Any).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
+    beside_offsets(without, nights, jitter, f64::INFINITY).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
 }
 
 /// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).
@@ -231,33 +222,14 @@ pub fn known_beside_offsets(
 
 /// Largest standard deviation of offsets that a search counts (km/s), for a spectrograph of that stability (km/s).
 pub fn most_offset_kms(stability_kms: Option<f64>) -> f64 {
-    Reach::Stable.most_kms(stability_kms)
+    MOST * stability_kms.unwrap_or(USUAL_KMS)
 }
 
-impl Reach {
-    /// The largest (km/s).
-    pub(super) fn most_kms(self, scale_kms: Option<f64>) -> f64 {
-        match self {
-            Reach::Stable => MOST * scale_kms.unwrap_or(USUAL_KMS),
-            Reach::Any => f64::INFINITY,
-        }
-    }
-
-    /// Those of the `sizes` (km/s) that are within it, and the largest, where some are beyond.
-    pub(super) fn of(self, sizes: &[f64], scale_kms: Option<f64>) -> Vec<f64> {
-        let most_kms = self.most_kms(scale_kms);
-        let mut within: Vec<f64> = sizes.iter().map(|size| size.min(most_kms)).collect();
-        within.dedup();
-        within
-    }
-
-    /// ln of the prior of an offset (km/s) relative to that of none.
-    fn ln_prior(self, night_kms: f64, scale_kms: Option<f64>) -> f64 {
-        match self {
-            Reach::Stable => 0.0,
-            Reach::Any => ln_prior(night_kms, scale_kms.or(Some(USUAL_KMS))),
-        }
-    }
+/// Those of the `sizes` (km/s) that are at most `most_kms`, and that, where some are larger.
+pub(super) fn within(sizes: &[f64], most_kms: f64) -> Vec<f64> {
+    let mut within: Vec<f64> = sizes.iter().map(|size| size.min(most_kms)).collect();
+    within.dedup();
+    within
 }
 
 /// Each of the jitters with each of the offsets.
@@ -285,7 +257,7 @@ impl Beside {
         without: &VelocityQuadratic,
         Nights(of_night): &Nights,
         scatter: Scatter,
-        (scale_kms, reach): (Option<f64>, Reach),
+        scale_kms: Option<f64>,
     ) -> Option<Self> {
         let Scatter { jitter_kms, night_kms } = scatter;
         let n = without.len();
@@ -300,7 +272,7 @@ impl Beside {
         let factor = inner.cholesky()?.unpack();
         let solved = factor.solve_lower_triangular(&turned)?;
         let moved = &without.information * solved.transpose();
-        let prior = ln_prior(jitter_kms, scale_kms) + reach.ln_prior(night_kms, scale_kms);
+        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior(night_kms, scale_kms.or(Some(USUAL_KMS)));
         let constant = prior - factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let height = constant + 0.5 * (&solved * &without.gradient).norm_squared();
         Some(Beside { columns, solved, moved, constant, height })

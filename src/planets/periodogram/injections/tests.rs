@@ -53,7 +53,7 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
             let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
             let moved = &without.gradient + &without.information * velocities(&cycles, 1.0 / period, ab);
             let moved = VelocityQuadratic { gradient: moved, ..without.clone() };
-            let beside = |scatter| Beside::new(&moved, &nights, scatter, (None, Reach::Stable)).unwrap();
+            let beside = |scatter| Beside::new(&moved, &nights, scatter, None).unwrap();
             let of = |size: &Size| (size.scatter, beside(size.scatter));
             let all: Vec<(Scatter, Beside)> = injections.fields[0].sizes.iter().map(of).collect();
             let (_, alone) = all.iter().max_by(|a, b| a.1.height.total_cmp(&b.1.height)).unwrap();
