@@ -96,8 +96,8 @@ const EVEN: f64 = 0.1;
 const TOLD: usize = 5;
 
 /// Marginal likelihoods of the models relative to no planet. Every model, including no planet, is marginalised over the
-/// same prior of the RV jitter and of nightly offsets, uniform up to the largest of `jitters`: what these absorb
-/// without a planet counts in favour of no planet only. `None` where the velocities do not bound an orbit.
+/// same priors of the RV jitter and of nightly offsets, up to the largest of `jitters`: what these absorb without a
+/// planet counts in favour of no planet only. `None` where the velocities do not bound an orbit.
 pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
     let weights = jitters.ln_weights();
     let alone = ln_sum(&weights);

@@ -57,8 +57,8 @@ pub struct WithoutJitter {
     pub here: Linearised,
     /// The jitter that was found, with the offsets in quadrature (km/s); 0 where none is needed.
     pub found_kms: f64,
-    /// Scale of its prior (km/s), where it has one.
-    pub scale_kms: Option<f64>,
+    /// Scale of its prior (km/s), the stability of the spectrograph.
+    pub scale_kms: f64,
     /// Nights with unknown RV offsets, where the profiles distinguish offsets from a jitter.
     pub nights: Option<Nights>,
 }

@@ -54,8 +54,8 @@ both `instrument.resolving_power` and `instrument.stability_ms`.
 
 R is that of the usual mode; of a slit it depends on its width. λ is a round value of the centre of LSD profiles of cool
 stars; it depends on the line list, and of CRIRES+, PEPSI and UVES on the setting. The RV stability, from night to night
-and without a gas cell, is the standard deviation of the prior of the RV jitter. This page is made from the table in
-`src/data/config/instruments.rs` by a test.
+and without a gas cell, is the scale of the priors of RV jitter and offsets of nights. This page is made from the table
+in `src/data/config/instruments.rs` by a test.
 
 | name | R | λ (nm) | RV stability (m/s) | sources |
 |---|---|---|---|---|

@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn draws_do_not_depend_on_threads() {
         let (quadratic, frequencies) = star();
-        for jitters in [Jitters::none(&quadratic), Jitters::new(&quadratic, 0.1, None)] {
+        for jitters in [Jitters::none(&quadratic), Jitters::new(&quadratic, 0.1, f64::INFINITY)] {
             let draw = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| FalseAlarm::draw(&jitters, &frequencies, 1001, 3))

@@ -50,7 +50,7 @@ pub enum Jitter {
     /// Its size: it is part of the noise.
     Known,
     /// It is fitted under a prior of that scale (km/s), as are offsets of these nights.
-    Fitted(Option<f64>, Option<Nights>),
+    Fitted(f64, Option<Nights>),
 }
 
 /// A star without a planet, into which orbits are injected.
@@ -66,9 +66,9 @@ pub struct Injections<'a> {
 /// One field, with all jitters and offsets.
 struct Field<'a> {
     star: &'a OfField,
+    /// Scale of the prior of the jitter (km/s), where it is fitted.
     scale_kms: Option<f64>,
     nights: Option<Nights>,
-    is_known: bool,
     sizes: Vec<Size>,
 }
 
@@ -151,18 +151,17 @@ impl<'a> Injections<'a> {
     fn level(&self, field: &Field, size: &Size) -> f64 {
         *once::found(&size.level, || {
             let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
-            let of_jitter = || Jitters::new(velocities, jitter_kms, field.scale_kms);
-            // without offsets in the model a jitter absorbs them
-            let of_nights = |nights: &Nights| {
-                let most_kms = most_offset_kms(field.scale_kms);
-                let units = nights.units(velocities, size.scatter, (jitter_kms.hypot(night_kms), most_kms));
-                beside(velocities, nights, (size.scatter, units), field.scale_kms)
+            let fitted = |scale_kms: f64| {
+                // without offsets in the model a jitter absorbs them
+                let of_nights = |nights: &Nights| {
+                    let most_kms = most_offset_kms(scale_kms);
+                    let units = nights.units(velocities, size.scatter, (jitter_kms.hypot(night_kms), most_kms));
+                    beside(velocities, nights, (size.scatter, units), scale_kms)
+                };
+                let of_jitter = || Jitters::new(velocities, jitter_kms, scale_kms);
+                field.nights.as_ref().and_then(of_nights).unwrap_or_else(of_jitter)
             };
-            let of_offsets = || field.nights.as_ref().and_then(of_nights);
-            let jitters = match field.is_known {
-                true => Jitters::none(velocities),
-                false => of_offsets().unwrap_or_else(of_jitter),
-            };
+            let jitters = field.scale_kms.map_or_else(|| Jitters::none(velocities), fitted);
             let SearchSettings { draws, seed } = self.settings;
             FalseAlarm::draw(&jitters, &self.frequencies.per_cycle, draws, seed).level(self.probability)
         })
@@ -184,20 +183,20 @@ impl<'a> Field<'a> {
         let most_kms = most_kms.max(error_kms);
         let (scale_kms, nights, scatters) = match jitter {
             Jitter::Known => (None, None, scatters(&[0.0], &[0.0])),
-            Jitter::Fitted(scale_kms, None) => (*scale_kms, None, scatters(&sizes(STEP, most_kms), &[0.0])),
-            Jitter::Fitted(scale_kms, nights) => {
-                let most_kms = most_offset_kms(*scale_kms);
+            Jitter::Fitted(scale, None) => (Some(*scale), None, scatters(&sizes(STEP, most_kms), &[0.0])),
+            Jitter::Fitted(scale, nights) => {
+                let most_kms = most_offset_kms(*scale);
                 let offsets = within(&sizes(STEP_OF_OFFSETS, most_kms), most_kms);
-                (*scale_kms, nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
+                (Some(*scale), nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
             }
         };
         let of_all = nights.clone().unwrap_or_else(|| Nights::none(velocities.len()));
         let size = |scatter: &Scatter| {
-            let beside = Beside::new(velocities, &of_all, *scatter, scale_kms)?;
+            let beside = Beside::new(velocities, &of_all, *scatter, scale_kms.unwrap_or(f64::INFINITY))?;
             Some(Size::new(*scatter, &beside, velocities, frequencies))
         };
         let sizes = scatters.par_iter().filter_map(size).collect();
-        Field { star, scale_kms, nights, is_known: matches!(jitter, Jitter::Known), sizes }
+        Field { star, scale_kms, nights, sizes }
     }
 
     /// With `orbits` of 1 km/s, cos and sin of one period.

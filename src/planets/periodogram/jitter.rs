@@ -19,13 +19,16 @@ const BY_CHANCE: f64 = 2.0;
 /// Directions of the gradient with less than this fraction of the largest variance are dropped.
 const STILL: f64 = 1e-13;
 
-/// ln of the prior of a jitter (km/s) relative to that of none: half-Cauchy of that scale (km/s), whose tail admits a
-/// larger jitter where the profiles require it (Gelman 2006, Bayesian Analysis 1, 515). Uniform without a scale.
-pub fn ln_prior(jitter_kms: f64, scale_kms: Option<f64>) -> f64 {
-    scale_kms.map_or(0.0, |scale| -(jitter_kms / scale).powi(2).ln_1p())
+/// Stability of a spectrograph that is not named (km/s): that of ESPaDOnS and Narval.
+pub const USUAL_STABILITY_KMS: f64 = 0.03;
+
+/// ln of the prior of a jitter (km/s) relative to that of none: half-Cauchy, its scale (km/s) the stability of the
+/// spectrograph; the tail admits a larger one where the profiles require it (Gelman 2006, Bayesian Analysis 1, 515).
+pub fn ln_prior(jitter_kms: f64, scale_kms: f64) -> f64 {
+    -(jitter_kms / scale_kms).powi(2).ln_1p()
 }
 
-/// ln of the weight of each size under a prior that is uniform up to the largest.
+/// ln of the share of each size in the range up to the largest.
 pub(super) fn ln_shares(sizes: &[f64]) -> Vec<f64> {
     let last = sizes.len() - 1;
     let share = |k: usize| 0.5 * (sizes[(k + 1).min(last)] - sizes[k.saturating_sub(1)]) / sizes[last];
@@ -52,7 +55,7 @@ pub struct Scatter {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jitters {
     pub(super) levels: Vec<Level>,
-    /// ln of the weight of each under a prior that is uniform up to the largest.
+    /// ln of the share of each in the range up to the largest.
     pub(super) ln_shares: Vec<f64>,
     /// The noise of stars without a planet, where it may include nightly offsets.
     pub(super) null: Option<Scatter>,
@@ -113,14 +116,14 @@ impl Jitters {
     }
 
     /// Jitters added to the quadratic `without` one; `found_kms` is the standard deviation (km/s) found without a
-    /// planet; with the [`ln_prior`] of a scale.
-    pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: Option<f64>) -> Self {
+    /// planet; with the [`ln_prior`] of that scale.
+    pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: f64) -> Self {
         let unit_kms = found_kms.max(by_chance_kms(&without.information));
         Jitters::in_units(without, (found_kms, unit_kms), scale_kms)
     }
 
     /// The same with trial jitters in `unit_kms`.
-    pub fn in_units(without: &VelocityQuadratic, (found_kms, unit_kms): (f64, f64), scale_kms: Option<f64>) -> Self {
+    pub fn in_units(without: &VelocityQuadratic, (found_kms, unit_kms): (f64, f64), scale_kms: f64) -> Self {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
         let among = |d: DVector<f64>| &u * DMatrix::from_diagonal(&d) * u.transpose();
@@ -150,7 +153,7 @@ impl Jitters {
         Jitters { levels, ln_shares: ln_shares(&SIZES), null: None, units, covariance }
     }
 
-    /// ln L of no planet at each size, weighted by a prior that is uniform up to the largest.
+    /// ln L of no planet at each size, weighted by the prior up to the largest.
     pub fn ln_weights(&self) -> Vec<f64> {
         self.levels.iter().zip(&self.ln_shares).map(|(level, ln_share)| level.ln_l + ln_share).collect()
     }

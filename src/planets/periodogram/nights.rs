@@ -27,9 +27,6 @@ const OFFSETS: (f64, f64, f64) = (0.1, 2.0, 1.25);
 /// offsets.
 const PARTS: [f64; 4] = [0.0, 0.5, 1.0, 1.4];
 
-/// Default stability of a spectrograph (km/s): that of ESPaDOnS and Narval.
-const USUAL_KMS: f64 = 0.03;
-
 /// Largest offsets in a search, in units of the stability.
 const MOST: f64 = 2.0;
 
@@ -110,7 +107,7 @@ pub struct Offsets {
 pub fn beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
-    jitter @ (found_kms, scale_kms): (f64, Option<f64>),
+    jitter @ (found_kms, scale_kms): (f64, f64),
     most_kms: f64,
 ) -> Option<(Jitters, Offsets)> {
     let (null, gain) = most_likely(without, nights, jitter, most_kms)?;
@@ -124,7 +121,7 @@ pub fn beside_offsets(
 pub fn most_likely(
     without: &VelocityQuadratic,
     nights: &Nights,
-    (found_kms, scale_kms): (f64, Option<f64>),
+    (found_kms, scale_kms): (f64, f64),
     most_kms: f64,
 ) -> Option<(Scatter, f64)> {
     let error_kms = (without.len() as f64 / without.information.trace()).sqrt();
@@ -154,7 +151,7 @@ pub fn beside_offsets_of(
     of_all: &Jitters,
     without: &VelocityQuadratic,
     nights: &Nights,
-    scale_kms: Option<f64>,
+    scale_kms: f64,
 ) -> Option<Jitters> {
     beside(without, nights, (of_all.null?, of_all.units), scale_kms)
 }
@@ -164,7 +161,7 @@ pub(super) fn beside(
     without: &VelocityQuadratic,
     nights: &Nights,
     (null, units): (Scatter, Scatter),
-    scale_kms: Option<f64>,
+    scale_kms: f64,
 ) -> Option<Jitters> {
     let jitters = SIZES.map(|size| size * units.jitter_kms);
     let mut offsets = PARTS.map(|part| part * units.night_kms).to_vec();
@@ -179,15 +176,11 @@ pub(super) fn beside(
 
 /// The likelihood of the velocities with this noise, a jitter and offsets of `nights`.
 pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) -> Option<VelocityQuadratic> {
-    Some(Beside::new(without, nights, noise, None)?.likelihood(without))
+    Some(Beside::new(without, nights, noise, f64::INFINITY)?.likelihood(without))
 }
 
 /// The same with offsets of any size. `None` where zero offsets are the most likely without a planet.
-fn beside_needed(
-    without: &VelocityQuadratic,
-    nights: &Nights,
-    jitter: (f64, Option<f64>),
-) -> Option<(Jitters, Offsets)> {
+fn beside_needed(without: &VelocityQuadratic, nights: &Nights, jitter: (f64, f64)) -> Option<(Jitters, Offsets)> {
     beside_offsets(without, nights, jitter, f64::INFINITY).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
 }
 
@@ -196,7 +189,7 @@ fn beside_needed(
 pub fn peak_beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
-    jitter: (f64, Option<f64>),
+    jitter: (f64, f64),
     (frequency, frequencies): (f64, &Frequencies),
     SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
@@ -210,7 +203,7 @@ pub fn peak_beside_offsets(
 pub fn known_beside_offsets(
     without: &VelocityQuadratic,
     nights: &Nights,
-    jitter: (f64, Option<f64>),
+    jitter: (f64, f64),
     unit: &DVector<f64>,
     SearchSettings { draws, seed }: SearchSettings,
 ) -> Option<NightOffsets> {
@@ -221,8 +214,8 @@ pub fn known_beside_offsets(
 }
 
 /// Largest standard deviation of offsets that a search counts (km/s), for a spectrograph of that stability (km/s).
-pub fn most_offset_kms(stability_kms: Option<f64>) -> f64 {
-    MOST * stability_kms.unwrap_or(USUAL_KMS)
+pub fn most_offset_kms(stability_kms: f64) -> f64 {
+    MOST * stability_kms
 }
 
 /// Those of the `sizes` (km/s) that are at most `most_kms`, and that, where some are larger.
@@ -257,7 +250,7 @@ impl Beside {
         without: &VelocityQuadratic,
         Nights(of_night): &Nights,
         scatter: Scatter,
-        scale_kms: Option<f64>,
+        scale_kms: f64,
     ) -> Option<Self> {
         let Scatter { jitter_kms, night_kms } = scatter;
         let n = without.len();
@@ -272,7 +265,7 @@ impl Beside {
         let factor = inner.cholesky()?.unpack();
         let solved = factor.solve_lower_triangular(&turned)?;
         let moved = &without.information * solved.transpose();
-        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior(night_kms, scale_kms.or(Some(USUAL_KMS)));
+        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior(night_kms, scale_kms);
         let constant = prior - factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let height = constant + 0.5 * (&solved * &without.gradient).norm_squared();
         Some(Beside { columns, solved, moved, constant, height })

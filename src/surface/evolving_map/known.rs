@@ -4,7 +4,7 @@ use super::{Assumed, Marginal};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, Prior};
 use crate::numerics::json::is_zero;
-use crate::planets::periodogram::ln_prior;
+use crate::planets::periodogram::{USUAL_STABILITY_KMS, ln_prior};
 use serde::{Deserialize, Serialize};
 
 /// Bounds of amplitude, slope and lifetime (d).
@@ -40,8 +40,7 @@ pub struct Known {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub night_kms: f64,
     /// Scale of the half-Cauchy prior of the jitter (km/s), where it is fitted: the stability of the spectrograph.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub jitter_scale_kms: Option<f64>,
+    pub jitter_scale_kms: f64,
     /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are uniform between the
     /// bounds in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
@@ -88,7 +87,7 @@ impl Known {
             lifetime: Some(field.kernel.lifetime),
             jitter_kms: Some(jitter_kms),
             night_kms,
-            jitter_scale_kms: None,
+            jitter_scale_kms: USUAL_STABILITY_KMS,
             priors: [None; 3],
             start: None,
         }

@@ -50,9 +50,8 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star without the overrides of data sets.
     pub star: StarSettings,
-    /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter. `None` where the
-    /// config has neither `instrument.name` nor `instrument.stability_ms`.
-    pub stability_kms: Option<f64>,
+    /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter.
+    pub stability_kms: f64,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
     /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
@@ -365,7 +364,7 @@ impl Settings {
             start: None,
             jitter_kms: self.velocity_jitter.number(),
             night_kms: 0.0,
-            jitter_scale_kms: self.stability_kms.map(|scale| scale.max(BEST_STABILITY_KMS)),
+            jitter_scale_kms: self.stability_kms.max(BEST_STABILITY_KMS),
         }
     }
 

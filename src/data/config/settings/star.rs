@@ -6,6 +6,7 @@ use crate::data::config::instruments::Spectrograph;
 use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star};
 use crate::model::Parameter;
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
+use crate::planets::periodogram::USUAL_STABILITY_KMS;
 use crate::star::{LimbDarkening, LocalLine, Regions, StarSettings};
 use std::f64::consts::TAU;
 
@@ -33,8 +34,8 @@ fn check_name(key: &str, name: &str) -> Result<(), Fault> {
     Err(Fault::new(key, problem))
 }
 
-/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s) where known.
-pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<Option<f64>, Fault> {
+/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s).
+pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<f64, Fault> {
     const NAME: &str = "instrument.name";
     if let Some(name) = &instrument.name {
         check_name(NAME, name)?;
@@ -50,9 +51,9 @@ pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<Option<f
             }
         }
     }
-    let Some(stability_ms) = instrument.stability_ms else { return Ok(None) };
+    let Some(stability_ms) = instrument.stability_ms else { return Ok(USUAL_STABILITY_KMS) };
     within("instrument.stability_ms", stability_ms, STABILITIES_MS)?;
-    Ok(Some(stability_ms / M_PER_KM))
+    Ok(stability_ms / M_PER_KM)
 }
 
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`.

@@ -11,7 +11,7 @@ fn a_jitter_adds_to_the_covariance() {
     let cycles = uneven(n, 4.0);
     let rv = 0.3 * sample::normal(n, 3);
     let without = sample::correlated(&cycles, &rv, 5);
-    let jitters = Jitters::new(&without, 0.2, None);
+    let jitters = Jitters::new(&without, 0.2, f64::INFINITY);
     let covariance = without.information.clone().try_inverse().unwrap();
     let density = |s: f64| {
         let c = &covariance + DMatrix::identity(n, n) * s * s;
@@ -41,7 +41,7 @@ fn search(n: usize, k_kms: f64, jitter_kms: f64, seed: u64) -> f64 {
     let found_kms = (rv.norm_squared() / n as f64 - 9e-4).max(0.0).sqrt();
     let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
     let settings = SearchSettings { draws: 1000, seed: 1 };
-    let found = Search::with_jitter(&Jitters::new(&without, found_kms, None), &frequencies, settings).unwrap();
+    let found = Search::with_jitter(&Jitters::new(&without, found_kms, f64::INFINITY), &frequencies, settings).unwrap();
     found.false_alarm.probability(found.best().orbit.delta_ln_l).value()
 }
 
