@@ -185,8 +185,8 @@ impl<'a> Field<'a> {
             Jitter::Known => (None, None, scatters(&[0.0], &[0.0])),
             Jitter::Fitted(scale, None) => (Some(*scale), None, scatters(&sizes(STEP, most_kms), &[0.0])),
             Jitter::Fitted(scale, nights) => {
-                let most_kms = most_offset_kms(*scale);
-                let offsets = within(&sizes(STEP_OF_OFFSETS, most_kms), most_kms);
+                let largest_kms = most_offset_kms(*scale);
+                let offsets = within(&sizes(STEP_OF_OFFSETS, largest_kms), largest_kms);
                 (Some(*scale), nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
             }
         };

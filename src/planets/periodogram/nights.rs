@@ -4,9 +4,9 @@
 //! profile and offsets t of the nights have the covariance `J = L L'` with `L = [s 1 | t N]`, N assigning profiles to
 //! nights. With it ln L of information I and gradient g has the information `I - I M I` and the gradient `(1 - I M) g`,
 //! `M = L A^-1 L'` and `A = 1 + L' I L`, and is higher at velocities 0 by `(g M g - ln det A) / 2`. As for a jitter
-//! alone (`jitter`), s and t are fitted without an orbit and with each orbit, t with the prior of a jitter: half-Cauchy,
-//! its scale the stability of the spectrograph. Simulated stars without a planet have the values that are the most
-//! likely without one, and are searched in the same way, also where these are 0.
+//! alone (`jitter`), s and t are fitted without an orbit and with each orbit, t with the prior of a jitter. Simulated
+//! stars without a planet have the values that are the most likely without one, and are searched in the same way, also
+//! where these are 0.
 
 use super::draws::amplitudes;
 use super::jitter::{Jitters, Level, SIZES, Scatter, by_chance_kms, ln_prior, ln_shares};

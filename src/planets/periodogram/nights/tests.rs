@@ -53,7 +53,8 @@ fn the_offsets_add_to_the_covariance() {
     let null = density(all[2]).2;
     for (scatter, level) in all.iter().zip(levels) {
         let (ln_l, inverse, _) = density(*scatter);
-        let above = ln_l - alone + ln_prior(scatter.night_kms, USUAL_STABILITY_KMS);
+        let of = |kms| ln_prior(kms, USUAL_STABILITY_KMS);
+        let above = ln_l - alone + of(scatter.jitter_kms) + of(scatter.night_kms);
         assert!((beside(scatter).height - above).abs() < 1e-8, "{scatter:?}");
         assert!((&level.quadratic.information - &inverse).norm() < 1e-8 * inverse.norm(), "{scatter:?}");
         assert!((&level.quadratic.gradient - &inverse * &rv).norm() < 1e-8 * (&inverse * &rv).norm(), "{scatter:?}");
