@@ -7,7 +7,7 @@ use crate::field::FieldError;
 use crate::model::Parameter;
 use crate::numerics::json::is_zero;
 use crate::planets::periodogram::nights::{Nights, beside_offsets, beside_offsets_of, most_likely, with_noise};
-use crate::planets::periodogram::{CircularOrbit, Jitters, Scatter, Unbounded, most_offset_kms};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Scatter, Unbounded};
 use crate::planets::speeds::with_unit;
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::{Remark, decimals};
@@ -57,8 +57,8 @@ pub struct WithoutJitter {
     pub here: Linearised,
     /// The jitter that was found, with the offsets in quadrature (km/s); 0 where none is needed.
     pub found_kms: f64,
-    /// Scale of its prior (km/s), the stability of the spectrograph.
-    pub scale_kms: f64,
+    /// Stability of the spectrograph (km/s).
+    pub stability_kms: f64,
     /// Nights with unknown RV offsets, where the profiles distinguish offsets from a jitter.
     pub nights: Option<Nights>,
 }
@@ -66,24 +66,22 @@ pub struct WithoutJitter {
 impl WithoutJitter {
     /// The likelihood of these velocities of this star with jitters and night offsets of several sizes.
     pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        let jitter = (self.found_kms, self.scale_kms);
-        let beside =
-            |nights: &Nights| Some(beside_offsets(quadratic, nights, jitter, most_offset_kms(self.scale_kms))?.0);
+        let jitter = (self.found_kms, self.stability_kms);
+        let beside = |nights: &Nights| Some(beside_offsets(quadratic, nights, jitter)?.0);
         self.nights.as_ref().and_then(beside).unwrap_or_else(|| self.beside_jitter(quadratic))
     }
 
     /// The same for some of the profiles, in their order, with the sizes that are likely in `of_all`.
     pub fn of_some_beside(&self, quadratic: &VelocityQuadratic, of_all: &Jitters) -> Jitters {
         let nights = self.nights.as_ref().map(|nights| nights.of(&quadratic.cycles, &self.here.quadratic.cycles));
-        let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, self.scale_kms);
+        let beside = |nights| beside_offsets_of(of_all, quadratic, &nights, self.stability_kms);
         let jitter_kms = (self.found_kms, of_all.units().jitter_kms);
-        nights.and_then(beside).unwrap_or_else(|| Jitters::in_units(quadratic, jitter_kms, self.scale_kms))
+        nights.and_then(beside).unwrap_or_else(|| Jitters::in_units(quadratic, jitter_kms, self.stability_kms))
     }
 
     /// The most likely jitter and night offsets of these velocities of this star, in which orbits are left free.
     pub fn noise(&self, velocities: &VelocityQuadratic) -> Option<Scatter> {
-        let (jitter, most_kms) = ((self.found_kms, self.scale_kms), most_offset_kms(self.scale_kms));
-        most_likely(velocities, self.nights.as_ref()?, jitter, most_kms).map(|(noise, _)| noise)
+        most_likely(velocities, self.nights.as_ref()?, (self.found_kms, self.stability_kms))
     }
 
     /// The likelihood of these velocities of this star with that noise.
@@ -94,14 +92,14 @@ impl WithoutJitter {
     /// With the jitter that was found, and parts of it, only: none where none was found.
     pub fn beside_found(&self, quadratic: &VelocityQuadratic) -> Jitters {
         match self.found_kms > 0.0 {
-            true => Jitters::in_units(quadratic, (self.found_kms, self.found_kms), self.scale_kms),
+            true => Jitters::in_units(quadratic, (self.found_kms, self.found_kms), self.stability_kms),
             false => Jitters::none(quadratic),
         }
     }
 
     /// With jitters of several sizes only.
     pub fn beside_jitter(&self, quadratic: &VelocityQuadratic) -> Jitters {
-        Jitters::new(quadratic, self.found_kms, self.scale_kms)
+        Jitters::new(quadratic, self.found_kms, self.stability_kms)
     }
 }
 

@@ -13,7 +13,7 @@ pub struct Spectrograph {
     pub resolving_power: f64,
     /// Central wavelength of LSD profiles (nm).
     pub wavelength_nm: f64,
-    /// RV stability (m/s) from night to night: scale of the half-Cauchy prior of the RV jitter.
+    /// RV stability (m/s) from night to night: scale of the priors of RV jitter and RV offsets of nights.
     pub stability_ms: f64,
     /// Where resolving power and stability are from.
     pub source: &'static str,

@@ -10,7 +10,7 @@ use crate::data::config::{
 };
 use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
-use crate::planets::periodogram::{Frequencies, FrequencySettings, USUAL_STABILITY_KMS, most_offset_kms};
+use crate::planets::periodogram::{Frequencies, FrequencySettings, most_offset_kms, stability_kms};
 use crate::planets::speeds::with_unit;
 use crate::star::observation::Observations;
 use crate::star::{BrightnessModel, Size};
@@ -302,17 +302,17 @@ impl Values {
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
                 // of static maps none are fitted
                 if draft.imaging.objective.properties().has_field {
-                    let of_name = |name: &str| Spectrograph::named(name).map(|of| of.stability_ms / 1e3);
-                    let stability_kms = |name: &str| of_name(name).unwrap_or(USUAL_STABILITY_KMS);
+                    let stability_ms = |name: &String| Some(Spectrograph::named(name)?.stability_ms);
+                    let stability_kms = stability_kms(draft.instrument.name.as_ref().and_then(stability_ms));
+                    let most = with_unit(most_offset_kms(stability_kms));
                     let remark = match draft.instrument.name {
-                        Some(ref name) => format!(
-                            "RV offsets of nights, up to {}, twice the stability of the spectrograph",
-                            with_unit(most_offset_kms(stability_kms(name)))
-                        ),
+                        Some(_) => {
+                            format!("RV offsets of nights, up to {most}, twice the stability of the spectrograph")
+                        }
                         None => format!(
-                            "RV offsets of nights, up to {} as no spectrograph is named: they hide small planets; \
-                            --instrument",
-                            with_unit(most_offset_kms(USUAL_STABILITY_KMS))
+                            "RV offsets of nights, up to {most} as no spectrograph is named (assumed stability: {}): \
+                            they hide small planets; --instrument",
+                            with_unit(stability_kms)
                         ),
                     };
                     ledger.note("observations.night_jitter_kms", "fitted", "km/s", Source::Assumed, remark);

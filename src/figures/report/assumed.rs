@@ -3,7 +3,7 @@
 use super::chapter::{Table, table};
 use crate::figures::plot::symbols::label;
 use crate::model::Parameter;
-use crate::planets::periodogram::{USUAL_STABILITY_KMS, most_offset_kms};
+use crate::planets::periodogram::{most_offset_kms, stability_kms};
 use crate::planets::speeds::with_unit;
 use crate::surface::calibration::star::mean_and_sd;
 use serde_json::Value;
@@ -68,8 +68,12 @@ pub(super) fn fixed(config: &Value) -> Table {
         let is_idle = evolves && STATIC.contains(pointer);
         if *pointer == NIGHTS && are_nights_fitted(config) {
             let stability_ms = config.pointer("/instrument/stability_ms").and_then(Value::as_f64);
-            let most = with_unit(most_offset_kms(stability_ms.map_or(USUAL_STABILITY_KMS, |x| x / 1e3)));
-            let text = format!("fitted where nights of several profiles show them, up to {most}");
+            let stability_kms = stability_kms(stability_ms);
+            let text = format!(
+                "fitted where nights of several profiles show them, up to {}; stability of the spectrograph {}",
+                with_unit(most_offset_kms(stability_kms)),
+                with_unit(stability_kms)
+            );
             return Some(vec![(*name).to_owned(), text]);
         }
         let value = config.pointer(pointer).filter(|value| !value.is_null() && !is_free(pointer) && !is_idle)?;
@@ -225,7 +229,7 @@ mod tests {
         assert_eq!([&rows[0][2], &rows[1][2]], ["3.60 ± 1.44 km/s", "value from the mean profile ± 15 %"]);
         assert_eq!(rows.len(), 2 + Parameter::REGIONS.len() - 1, "{rows:?}");
         let nights = |config: &Value| fixed(config).rows.into_iter().find(|row| row[0].contains("nights"));
-        assert!(nights(&config).unwrap()[1].ends_with("up to 60 m/s"));
+        assert!(nights(&config).unwrap()[1].ends_with("up to 60 m/s; stability of the spectrograph 30 m/s"));
         config["observations"] = json!({ "night_jitter_kms": 0.0 });
         assert_eq!(nights(&config).unwrap()[1], "0 km/s");
         for held in [json!({ "velocity_jitter_kms": 0.0 }), json!([{ "night_jitter_kms": 0.01 }, {}])] {

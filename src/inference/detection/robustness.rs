@@ -179,7 +179,7 @@ impl Detection {
     pub fn peak_beside_nights(&self, settings: SearchSettings) -> Option<NightOffsets> {
         let star = self.without_jitter.as_ref().filter(|_| self.is_candidate())?;
         let velocities = self.known.beside(&star.here.quadratic);
-        let (peak, jitter) = (1.0 / self.blind.best().porb_over_prot, (star.found_kms, star.scale_kms));
+        let (peak, jitter) = (1.0 / self.blind.best().porb_over_prot, (star.found_kms, star.stability_kms));
         let found =
             peak_beside_offsets(&velocities, star.nights.as_ref()?, jitter, (peak, &self.frequencies), settings)?;
         Some(found).filter(|found| found.sigma_kms > self.blind.false_alarm.night_kms)
@@ -190,7 +190,8 @@ impl Detection {
         let alone = self.alone.as_ref().filter(|_| planet.is_candidate())?;
         let star = alone.without_jitter.as_ref()?;
         let velocities = self.known.beside_others(planet, &star.here.quadratic);
-        let (unit, jitter) = (planet.ephemeris.unit_velocities(&velocities.cycles), (star.found_kms, star.scale_kms));
+        let (unit, jitter) =
+            (planet.ephemeris.unit_velocities(&velocities.cycles), (star.found_kms, star.stability_kms));
         known_beside_offsets(&velocities, star.nights.as_ref()?, jitter, &unit, settings)
     }
 }

@@ -1,7 +1,7 @@
 //! Marginal likelihoods against sums over all parameters, and how often noise produces a large Bayes factor.
 
 use super::*;
-use crate::planets::periodogram::sample::{self, correlated, normal, orbit, uneven};
+use crate::planets::periodogram::sample::{self, STABILITY_KMS, correlated, normal, orbit, uneven};
 use nalgebra::DVector;
 
 const K_MAX: f64 = 0.4;
@@ -206,7 +206,7 @@ fn a_planet_does_not_hide_behind_the_jitter_that_it_makes() {
     let cycles = uneven(16, 4.0);
     let rv = sample::orbit(&cycles, 0.3, 1.7, 0.3) + 0.03 * sample::normal(16, 3);
     let without = sample::independent(&cycles, &rv, &DVector::from_element(16, 0.03));
-    let jitters = Jitters::new(&without, (rv.norm_squared() / 16.0 - 9e-4).sqrt(), f64::INFINITY);
+    let jitters = Jitters::new(&without, (rv.norm_squared() / 16.0 - 9e-4).sqrt(), STABILITY_KMS);
     with_priors([[0.8, 4.0]; 2], 0.0, |priors| {
         let circle = |jitters: &Jitters| evidence(jitters, priors, 1).unwrap().circle.ln_bayes;
         let (held, shared) = (circle(&Jitters::none(&jitters.as_found().quadratic)), circle(&jitters));
@@ -215,7 +215,7 @@ fn a_planet_does_not_hide_behind_the_jitter_that_it_makes() {
     // noise alone is no planet, whatever its size
     let noise = 0.3 * sample::normal(16, 5);
     let without = sample::independent(&cycles, &noise, &DVector::from_element(16, 0.03));
-    let jitters = Jitters::new(&without, 0.3, f64::INFINITY);
+    let jitters = Jitters::new(&without, 0.3, STABILITY_KMS);
     let found = with_priors([[0.8, 4.0]; 2], 0.0, |priors| evidence(&jitters, priors, 1).unwrap());
     assert!(found.circle.ln_bayes < 1.0, "{:?}", found.circle);
 }

@@ -145,7 +145,7 @@ impl FalseAlarm {
 mod tests {
     use super::super::frequencies::{Frequencies, FrequencySettings};
     use super::super::orbits::scan;
-    use super::super::sample::{self, uneven};
+    use super::super::sample::{self, STABILITY_KMS, uneven};
     use super::*;
     use crate::planets::velocities::VelocityQuadratic;
     use nalgebra::DVector;
@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn draws_do_not_depend_on_threads() {
         let (quadratic, frequencies) = star();
-        for jitters in [Jitters::none(&quadratic), Jitters::new(&quadratic, 0.1, f64::INFINITY)] {
+        for jitters in [Jitters::none(&quadratic), Jitters::new(&quadratic, 0.1, STABILITY_KMS)] {
             let draw = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| FalseAlarm::draw(&jitters, &frequencies, 1001, 3))

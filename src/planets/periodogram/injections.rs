@@ -11,7 +11,7 @@
 use super::draws::factor;
 use super::false_alarm::FalseAlarm;
 use super::jitter::{Jitters, Scatter};
-use super::nights::{Beside, Nights, beside, most_offset_kms, scatters, within};
+use super::nights::{Beside, Nights, beside, clipped, most_offset_kms, scatters};
 use super::orbits::{amplitudes, design, scan};
 use super::{Frequencies, SearchSettings};
 use crate::numerics::once;
@@ -49,7 +49,7 @@ pub struct OfField {
 pub enum Jitter {
     /// Its size: it is part of the noise.
     Known,
-    /// It is fitted under a prior of that scale (km/s), as are offsets of these nights.
+    /// It is fitted, as are offsets of these nights, for a spectrograph of that stability (km/s).
     Fitted(f64, Option<Nights>),
 }
 
@@ -66,8 +66,8 @@ pub struct Injections<'a> {
 /// One field, with all jitters and offsets.
 struct Field<'a> {
     star: &'a OfField,
-    /// Scale of the prior of the jitter (km/s), where it is fitted.
-    scale_kms: Option<f64>,
+    /// Stability of the spectrograph (km/s), where the jitter is fitted.
+    stability_kms: Option<f64>,
     nights: Option<Nights>,
     sizes: Vec<Size>,
 }
@@ -151,17 +151,17 @@ impl<'a> Injections<'a> {
     fn level(&self, field: &Field, size: &Size) -> f64 {
         *once::found(&size.level, || {
             let (velocities, Scatter { jitter_kms, night_kms }) = (&field.star.velocities, size.scatter);
-            let fitted = |scale_kms: f64| {
+            let fitted = |stability_kms: f64| {
                 // without offsets in the model a jitter absorbs them
                 let of_nights = |nights: &Nights| {
-                    let most_kms = most_offset_kms(scale_kms);
+                    let most_kms = most_offset_kms(stability_kms);
                     let units = nights.units(velocities, size.scatter, (jitter_kms.hypot(night_kms), most_kms));
-                    beside(velocities, nights, (size.scatter, units), scale_kms)
+                    beside(velocities, nights, (size.scatter, units), stability_kms)
                 };
-                let of_jitter = || Jitters::new(velocities, jitter_kms, scale_kms);
+                let of_jitter = || Jitters::new(velocities, jitter_kms, stability_kms);
                 field.nights.as_ref().and_then(of_nights).unwrap_or_else(of_jitter)
             };
-            let jitters = field.scale_kms.map_or_else(|| Jitters::none(velocities), fitted);
+            let jitters = field.stability_kms.map_or_else(|| Jitters::none(velocities), fitted);
             let SearchSettings { draws, seed } = self.settings;
             FalseAlarm::draw(&jitters, &self.frequencies.per_cycle, draws, seed).level(self.probability)
         })
@@ -181,22 +181,23 @@ impl<'a> Field<'a> {
             kms
         };
         let most_kms = most_kms.max(error_kms);
-        let (scale_kms, nights, scatters) = match jitter {
+        let (stability_kms, nights, scatters) = match jitter {
             Jitter::Known => (None, None, scatters(&[0.0], &[0.0])),
             Jitter::Fitted(scale, None) => (Some(*scale), None, scatters(&sizes(STEP, most_kms), &[0.0])),
             Jitter::Fitted(scale, nights) => {
                 let largest_kms = most_offset_kms(*scale);
-                let offsets = within(&sizes(STEP_OF_OFFSETS, largest_kms), largest_kms);
+                let offsets = clipped(&sizes(STEP_OF_OFFSETS, largest_kms), largest_kms);
                 (Some(*scale), nights.clone(), scatters(&sizes(STEP, most_kms), &offsets))
             }
         };
         let of_all = nights.clone().unwrap_or_else(|| Nights::none(velocities.len()));
         let size = |scatter: &Scatter| {
-            let beside = Beside::new(velocities, &of_all, *scatter, scale_kms.unwrap_or(f64::INFINITY))?;
+            // where the jitter is known there is none
+            let beside = Beside::new(velocities, &of_all, *scatter, stability_kms.unwrap_or(f64::INFINITY))?;
             Some(Size::new(*scatter, &beside, velocities, frequencies))
         };
         let sizes = scatters.par_iter().filter_map(size).collect();
-        Field { star, scale_kms, nights, sizes }
+        Field { star, stability_kms, nights, sizes }
     }
 
     /// With `orbits` of 1 km/s, cos and sin of one period.

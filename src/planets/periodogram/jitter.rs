@@ -19,13 +19,23 @@ const BY_CHANCE: f64 = 2.0;
 /// Directions of the gradient with less than this fraction of the largest variance are dropped.
 const STILL: f64 = 1e-13;
 
-/// Stability of a spectrograph that is not named (km/s): that of ESPaDOnS and Narval.
-pub const USUAL_STABILITY_KMS: f64 = 0.03;
+/// Stability of a spectrograph that is not named (m/s): that of ESPaDOnS and Narval.
+const USUAL_STABILITY_MS: f64 = 30.0;
 
-/// ln of the prior of a jitter (km/s) relative to that of none: half-Cauchy, its scale (km/s) the stability of the
-/// spectrograph; the tail admits a larger one where the profiles require it (Gelman 2006, Bayesian Analysis 1, 515).
-pub fn ln_prior(jitter_kms: f64, scale_kms: f64) -> f64 {
-    -(jitter_kms / scale_kms).powi(2).ln_1p()
+/// Least stability in a prior (m/s).
+const LEAST_STABILITY_MS: f64 = 0.1;
+
+/// RV stability of a spectrograph (km/s), given in m/s where it is known: scale of the priors of RV jitter and of RV
+/// offsets of nights.
+pub fn stability_kms(stability_ms: Option<f64>) -> f64 {
+    stability_ms.unwrap_or(USUAL_STABILITY_MS).max(LEAST_STABILITY_MS) / 1e3
+}
+
+/// ln of the prior of a jitter or of offsets of nights (km/s) relative to that of none: half-Cauchy, its scale (km/s)
+/// the stability of the spectrograph; the tail admits larger ones where the profiles require them (Gelman 2006,
+/// Bayesian Analysis 1, 515). Uniform with an infinite scale.
+pub fn ln_prior(jitter_kms: f64, stability_kms: f64) -> f64 {
+    -(jitter_kms / stability_kms).powi(2).ln_1p()
 }
 
 /// ln of the share of each size in the range up to the largest.
@@ -117,13 +127,13 @@ impl Jitters {
 
     /// Jitters added to the quadratic `without` one; `found_kms` is the standard deviation (km/s) found without a
     /// planet; with the [`ln_prior`] of that scale.
-    pub fn new(without: &VelocityQuadratic, found_kms: f64, scale_kms: f64) -> Self {
+    pub fn new(without: &VelocityQuadratic, found_kms: f64, stability_kms: f64) -> Self {
         let unit_kms = found_kms.max(by_chance_kms(&without.information));
-        Jitters::in_units(without, (found_kms, unit_kms), scale_kms)
+        Jitters::in_units(without, (found_kms, unit_kms), stability_kms)
     }
 
     /// The same with trial jitters in `unit_kms`.
-    pub fn in_units(without: &VelocityQuadratic, (found_kms, unit_kms): (f64, f64), scale_kms: f64) -> Self {
+    pub fn in_units(without: &VelocityQuadratic, (found_kms, unit_kms): (f64, f64), stability_kms: f64) -> Self {
         let eigen = without.information.clone().symmetric_eigen();
         let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
         let among = |d: DVector<f64>| &u * DMatrix::from_diagonal(&d) * u.transpose();
@@ -131,7 +141,7 @@ impl Jitters {
         let level = |size: f64| {
             let variance = (size * unit_kms).powi(2);
             let left = lambda.map(|l| 1.0 / (1.0 + variance * l));
-            let constant = 0.5 * left.map(f64::ln).sum() + ln_prior(size * unit_kms, scale_kms);
+            let constant = 0.5 * left.map(f64::ln).sum() + ln_prior(size * unit_kms, stability_kms);
             let information = among(lambda.component_mul(&left));
             Level {
                 ln_l: constant + 0.5 * variance * pulled.component_mul(&pulled).dot(&left),
@@ -153,7 +163,7 @@ impl Jitters {
         Jitters { levels, ln_shares: ln_shares(&SIZES), null: None, units, covariance }
     }
 
-    /// ln L of no planet at each size, weighted by the prior up to the largest.
+    /// ln L of no planet at each size, including its prior and its share of the range up to the largest.
     pub fn ln_weights(&self) -> Vec<f64> {
         self.levels.iter().zip(&self.ln_shares).map(|(level, ln_share)| level.ln_l + ln_share).collect()
     }

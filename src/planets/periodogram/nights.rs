@@ -102,27 +102,36 @@ pub struct Offsets {
     pub gain: f64,
 }
 
-/// The likelihood of the velocities with a jitter, found to be `found_kms` without a planet and with a prior of that
-/// scale, the stability of the spectrograph, and with offsets of `nights`, at most `most_kms`.
-pub fn beside_offsets(
+/// The likelihood of the velocities with a jitter, found to be `found_kms` without a planet, and with offsets of
+/// `nights`, at most twice the stability of the spectrograph, both with the prior of that (`jitter::ln_prior`).
+pub fn beside_offsets(without: &VelocityQuadratic, nights: &Nights, jitter: (f64, f64)) -> Option<(Jitters, Offsets)> {
+    beside_up_to(most_offset_kms(jitter.1), without, nights, jitter)
+}
+
+/// The same with offsets of at most `most_kms`.
+fn beside_up_to(
+    most_kms: f64,
     without: &VelocityQuadratic,
     nights: &Nights,
-    jitter @ (found_kms, scale_kms): (f64, f64),
-    most_kms: f64,
+    jitter @ (found_kms, stability_kms): (f64, f64),
 ) -> Option<(Jitters, Offsets)> {
-    let (null, gain) = most_likely(without, nights, jitter, most_kms)?;
+    let (null, gain) = likeliest(most_kms, without, nights, jitter)?;
     let units = nights.units(without, null, (found_kms, most_kms));
-    let all = beside(without, nights, (null, units), scale_kms)?;
+    let all = beside(without, nights, (null, units), stability_kms)?;
     Some((all, Offsets { sigma_kms: null.night_kms, gain }))
 }
 
-/// The most likely jitter and offsets where these velocities are 0, and by how much the offsets raise ln L, including
-/// their prior; arguments as in [`beside_offsets`].
-pub fn most_likely(
+/// The most likely jitter and offsets where these velocities are 0; arguments as in [`beside_offsets`].
+pub fn most_likely(without: &VelocityQuadratic, nights: &Nights, jitter: (f64, f64)) -> Option<Scatter> {
+    likeliest(most_offset_kms(jitter.1), without, nights, jitter).map(|(scatter, _)| scatter)
+}
+
+/// The same with offsets of at most `most_kms`, and by how much these raise ln L, including their prior.
+fn likeliest(
+    most_kms: f64,
     without: &VelocityQuadratic,
     nights: &Nights,
-    (found_kms, scale_kms): (f64, f64),
-    most_kms: f64,
+    (found_kms, stability_kms): (f64, f64),
 ) -> Option<(Scatter, f64)> {
     let error_kms = (without.len() as f64 / without.information.trace()).sqrt();
     let (first, last, factor) = OFFSETS;
@@ -132,10 +141,10 @@ pub fn most_likely(
         sizes.push(size * found_kms.max(error_kms));
         size *= factor;
     }
-    let sizes = within(&sizes, most_kms);
+    let sizes = clipped(&sizes, most_kms);
     let jitters = if found_kms > 0.0 { JITTERS.map(|part| part * found_kms).to_vec() } else { vec![0.0] };
     let tried = scatters(&jitters, &sizes);
-    let of = |one: &Scatter| Beside::new(without, nights, *one, scale_kms);
+    let of = |one: &Scatter| Beside::new(without, nights, *one, stability_kms);
     let height = |one: &Scatter| of(one).map_or(f64::NEG_INFINITY, |of| of.height);
     let heights: Vec<f64> = tried.par_iter().map(height).collect();
     let highest = |with: bool| {
@@ -151,9 +160,9 @@ pub fn beside_offsets_of(
     of_all: &Jitters,
     without: &VelocityQuadratic,
     nights: &Nights,
-    scale_kms: f64,
+    stability_kms: f64,
 ) -> Option<Jitters> {
-    beside(without, nights, (of_all.null?, of_all.units), scale_kms)
+    beside(without, nights, (of_all.null?, of_all.units), stability_kms)
 }
 
 /// The same where `null` has the jitter and offsets of stars without a planet; trial sizes are in these units.
@@ -161,12 +170,12 @@ pub(super) fn beside(
     without: &VelocityQuadratic,
     nights: &Nights,
     (null, units): (Scatter, Scatter),
-    scale_kms: f64,
+    stability_kms: f64,
 ) -> Option<Jitters> {
     let jitters = SIZES.map(|size| size * units.jitter_kms);
     let mut offsets = PARTS.map(|part| part * units.night_kms).to_vec();
     offsets.dedup();
-    let of = |one: Scatter| Beside::new(without, nights, one, scale_kms);
+    let of = |one: Scatter| Beside::new(without, nights, one, stability_kms);
     let all: Option<Vec<Beside>> = scatters(&jitters, &offsets).into_par_iter().map(of).collect();
     let of_jitter = ln_shares(&SIZES);
     let shares = ln_shares(&offsets).into_iter().flat_map(|night| of_jitter.iter().map(move |jitter| jitter + night));
@@ -181,7 +190,7 @@ pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) 
 
 /// The same with offsets of any size. `None` where zero offsets are the most likely without a planet.
 fn beside_needed(without: &VelocityQuadratic, nights: &Nights, jitter: (f64, f64)) -> Option<(Jitters, Offsets)> {
-    beside_offsets(without, nights, jitter, f64::INFINITY).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
+    beside_up_to(f64::INFINITY, without, nights, jitter).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
 }
 
 /// Effect of nightly offsets of any size on the highest peak, at one of the frequencies (orbits a rotation cycle).
@@ -219,10 +228,10 @@ pub fn most_offset_kms(stability_kms: f64) -> f64 {
 }
 
 /// Those of the `sizes` (km/s) that are at most `most_kms`, and that, where some are larger.
-pub(super) fn within(sizes: &[f64], most_kms: f64) -> Vec<f64> {
-    let mut within: Vec<f64> = sizes.iter().map(|size| size.min(most_kms)).collect();
-    within.dedup();
-    within
+pub(super) fn clipped(sizes: &[f64], most_kms: f64) -> Vec<f64> {
+    let mut clipped: Vec<f64> = sizes.iter().map(|size| size.min(most_kms)).collect();
+    clipped.dedup();
+    clipped
 }
 
 /// Each of the jitters with each of the offsets.
@@ -250,7 +259,7 @@ impl Beside {
         without: &VelocityQuadratic,
         Nights(of_night): &Nights,
         scatter: Scatter,
-        scale_kms: f64,
+        stability_kms: f64,
     ) -> Option<Self> {
         let Scatter { jitter_kms, night_kms } = scatter;
         let n = without.len();
@@ -265,7 +274,7 @@ impl Beside {
         let factor = inner.cholesky()?.unpack();
         let solved = factor.solve_lower_triangular(&turned)?;
         let moved = &without.information * solved.transpose();
-        let prior = ln_prior(jitter_kms, scale_kms) + ln_prior(night_kms, scale_kms);
+        let prior = ln_prior(jitter_kms, stability_kms) + ln_prior(night_kms, stability_kms);
         let constant = prior - factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let height = constant + 0.5 * (&solved * &without.gradient).norm_squared();
         Some(Beside { columns, solved, moved, constant, height })

@@ -7,6 +7,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::f64::consts::TAU;
 
+/// Stability of the spectrograph (km/s).
+pub const STABILITY_KMS: f64 = 0.03;
+
 /// `n` cycles spread unevenly over `span`.
 pub fn uneven(n: usize, span: f64) -> Vec<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(n as u64);

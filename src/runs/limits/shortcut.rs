@@ -103,7 +103,7 @@ impl<'a> Shortcut<'a> {
             BestOrbit::In => false,
         };
         let mut star = found.planet_free.clone();
-        let fitted = |of: &WithoutJitter| Jitter::Fitted(of.scale_kms, of.nights.clone());
+        let fitted = |of: &WithoutJitter| Jitter::Fitted(of.stability_kms, of.nights.clone());
         let jitter = found.without_jitter.as_ref().map_or(Jitter::Known, fitted);
         let (mut before, mut removed) = (found.blind.clone(), None);
         let mut at = At { imager, values, nuisances: &detection.nuisances };

@@ -4,7 +4,7 @@ use super::{Assumed, Marginal};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, Prior};
 use crate::numerics::json::is_zero;
-use crate::planets::periodogram::{USUAL_STABILITY_KMS, ln_prior};
+use crate::planets::periodogram::{ln_prior, stability_kms};
 use serde::{Deserialize, Serialize};
 
 /// Bounds of amplitude, slope and lifetime (d).
@@ -23,7 +23,7 @@ pub const LARGEST_AMPLITUDE: f64 = 1.0;
 const BREAK_DEGREE: f64 = 7.0;
 
 /// Prior knowledge of the field; parameters that are `None` are fitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
     /// Standard deviation of the filling factor.
     pub amplitude: Option<f64>,
@@ -39,8 +39,8 @@ pub struct Known {
     /// RV offsets of nights (km/s), in data sets where their size is not given.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub night_kms: f64,
-    /// Scale of the half-Cauchy prior of the jitter (km/s), where it is fitted: the stability of the spectrograph.
-    pub jitter_scale_kms: f64,
+    /// RV stability of the spectrograph (km/s): scale of the priors of jitter and offsets of nights.
+    pub stability_kms: f64,
     /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are uniform between the
     /// bounds in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
@@ -76,9 +76,25 @@ impl From<Assumed> for FieldStart {
     }
 }
 
+impl Default for Known {
+    fn default() -> Self {
+        Known {
+            amplitude: None,
+            slope: None,
+            break_degree: None,
+            lifetime: None,
+            jitter_kms: None,
+            night_kms: 0.0,
+            stability_kms: stability_kms(None),
+            priors: [None; 3],
+            start: None,
+        }
+    }
+}
+
 impl Known {
-    /// All values as fitted.
-    pub fn of(marginal: &Marginal) -> Self {
+    /// All values as fitted, for a spectrograph of that stability (km/s).
+    pub fn of(marginal: &Marginal, stability_kms: f64) -> Self {
         let Assumed { field, jitter_kms, night_kms } = marginal.assumed;
         Known {
             amplitude: Some(field.spectrum.amplitude),
@@ -87,7 +103,7 @@ impl Known {
             lifetime: Some(field.kernel.lifetime),
             jitter_kms: Some(jitter_kms),
             night_kms,
-            jitter_scale_kms: USUAL_STABILITY_KMS,
+            stability_kms,
             priors: [None; 3],
             start: None,
         }
@@ -155,7 +171,7 @@ impl Known {
             _ => 0.0,
         };
         let jitter = match self.jitter_kms {
-            None => ln_prior(assumed.jitter_kms, self.jitter_scale_kms),
+            None => ln_prior(assumed.jitter_kms, self.stability_kms),
             Some(_) => 0.0,
         };
         (0..3).filter_map(of).sum::<f64>() + usual + jitter

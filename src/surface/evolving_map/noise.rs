@@ -21,15 +21,15 @@ pub(super) fn without(at: At, here: &Linearised, known: &Known) -> Result<Option
     }
     let fitted = here.kept::<Fitted>();
     let Assumed { jitter_kms, night_kms, .. } = fitted.marginal.assumed;
-    let (found_kms, scale_kms) = (jitter_kms.hypot(night_kms), known.jitter_scale_kms);
+    let (found_kms, stability_kms) = (jitter_kms.hypot(night_kms), known.stability_kms);
     let nights = Nights::new(here.quadratic.len(), &at.imager.nights_of_sets());
     if !fitted.marginal.assumed.has_noise() {
-        return Ok(Some(WithoutJitter { here: here.clone(), found_kms, scale_kms, nights }));
+        return Ok(Some(WithoutJitter { here: here.clone(), found_kms, stability_kms, nights }));
     }
     let marginal = fitted.marginal.without_jitter(at.imager)?;
     let without = linearised(at.imager, Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
     let here = Linearised { field: here.field.clone(), ..without };
-    Ok(Some(WithoutJitter { here, found_kms, scale_kms, nights }))
+    Ok(Some(WithoutJitter { here, found_kms, stability_kms, nights }))
 }
 
 /// The star `here` with this noise.

@@ -88,7 +88,10 @@ impl SurfaceModel for EvolvingMap {
 
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel> {
         let Fitted { marginal, at_bounds, .. } = here.kept();
-        Box::new(EvolvingMap { known: Known::of(marginal), at_bounds: Some(at_bounds.clone()) })
+        Box::new(EvolvingMap {
+            known: Known::of(marginal, self.known.stability_kms),
+            at_bounds: Some(at_bounds.clone()),
+        })
     }
 
     fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>> {

@@ -40,9 +40,6 @@ use plan::resolve_plan;
 use star::{fitted_star, resolve_instrument, resolve_star};
 use std::path::{Path, PathBuf};
 
-/// Smallest stability (km/s).
-const BEST_STABILITY_KMS: f64 = 1e-4;
-
 /// A whole config, resolved.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -50,7 +47,7 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star without the overrides of data sets.
     pub star: StarSettings,
-    /// RV stability of the spectrograph (km/s): scale of the half-Cauchy prior of the RV jitter.
+    /// RV stability of the spectrograph (km/s): scale of the priors of RV jitter and RV offsets of nights.
     pub stability_kms: f64,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
@@ -364,7 +361,7 @@ impl Settings {
             start: None,
             jitter_kms: self.velocity_jitter.number(),
             night_kms: 0.0,
-            jitter_scale_kms: self.stability_kms.max(BEST_STABILITY_KMS),
+            stability_kms: self.stability_kms,
         }
     }
 

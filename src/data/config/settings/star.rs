@@ -6,7 +6,7 @@ use crate::data::config::instruments::Spectrograph;
 use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star};
 use crate::model::Parameter;
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use crate::planets::periodogram::USUAL_STABILITY_KMS;
+use crate::planets::periodogram::stability_kms;
 use crate::star::{LimbDarkening, LocalLine, Regions, StarSettings};
 use std::f64::consts::TAU;
 
@@ -15,9 +15,6 @@ const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
 
 /// Least and largest RV stability of a spectrograph (m/s).
 const STABILITIES_MS: [f64; 2] = [0.0, 1e5];
-
-/// Metres in a kilometre.
-const M_PER_KM: f64 = 1e3;
 
 /// Longest name of a star or a spectrograph (characters).
 const LONGEST_NAME: usize = 80;
@@ -51,9 +48,10 @@ pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<f64, Fau
             }
         }
     }
-    let Some(stability_ms) = instrument.stability_ms else { return Ok(USUAL_STABILITY_KMS) };
-    within("instrument.stability_ms", stability_ms, STABILITIES_MS)?;
-    Ok(stability_ms / M_PER_KM)
+    if let Some(stability_ms) = instrument.stability_ms {
+        within("instrument.stability_ms", stability_ms, STABILITIES_MS)?;
+    }
+    Ok(stability_kms(instrument.stability_ms))
 }
 
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`.

@@ -1,9 +1,8 @@
 //! Injected orbits against searches of velocities that contain them.
 
 use super::super::FrequencySettings;
-use super::super::USUAL_STABILITY_KMS;
 use super::super::orbits::velocities;
-use super::super::sample::{self, uneven};
+use super::super::sample::{self, STABILITY_KMS, uneven};
 use super::*;
 
 /// Velocities whose information halves from field to field: an orbit is searched for with the best field of the star
@@ -46,9 +45,7 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
     let settings = SearchSettings { draws: 1000, seed: 1 };
     let star = [OfField { velocities: without.clone(), held: without.clone(), ln_posterior: 0.0 }];
     let pairs: Vec<Vec<usize>> = (0..10).map(|night| vec![2 * night, 2 * night + 1]).collect();
-    for fitted in
-        [Jitter::Fitted(USUAL_STABILITY_KMS, None), Jitter::Fitted(USUAL_STABILITY_KMS, Nights::new(20, &pairs))]
-    {
+    for fitted in [Jitter::Fitted(STABILITY_KMS, None), Jitter::Fitted(STABILITY_KMS, Nights::new(20, &pairs))] {
         let injections = Injections::new(&star, &fitted, 0.6, &frequencies, settings, 0.01);
         let nights = injections.fields[0].nights.clone().unwrap_or_else(|| Nights::none(20));
         for (period, k_kms, phi) in [(1.7, 0.0, 0.0), (1.7, 0.3, 0.4), (0.61, 0.6, 0.9)] {
@@ -56,7 +53,7 @@ fn a_peak_is_that_of_the_search_with_the_orbit_in_the_velocities() {
             let ab = amplitudes(&cycles, 1.0 / period, k_kms, phi);
             let moved = &without.gradient + &without.information * velocities(&cycles, 1.0 / period, ab);
             let moved = VelocityQuadratic { gradient: moved, ..without.clone() };
-            let beside = |scatter| Beside::new(&moved, &nights, scatter, USUAL_STABILITY_KMS).unwrap();
+            let beside = |scatter| Beside::new(&moved, &nights, scatter, STABILITY_KMS).unwrap();
             let of = |size: &Size| (size.scatter, beside(size.scatter));
             let all: Vec<(Scatter, Beside)> = injections.fields[0].sizes.iter().map(of).collect();
             let (_, alone) = all.iter().max_by(|a, b| a.1.height.total_cmp(&b.1.height)).unwrap();
@@ -94,7 +91,7 @@ fn fields_are_fitted_without_offsets_of_nights() {
     let settings = SearchSettings { draws: 1000, seed: 1 };
     let pairs: Vec<Vec<usize>> = (0..10).map(|night| vec![2 * night, 2 * night + 1]).collect();
     let heights = [None, Nights::new(20, &pairs)].map(|nights| {
-        let fitted = Jitter::Fitted(USUAL_STABILITY_KMS, nights);
+        let fitted = Jitter::Fitted(STABILITY_KMS, nights);
         let injections = Injections::new(&stars, &fitted, 0.6, &frequencies, settings, 0.01);
         injections.column(1.7).ln_posteriors(amplitudes(&cycles, 1.0 / 1.7, 0.3, 0.4))[0]
     });

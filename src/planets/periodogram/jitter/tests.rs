@@ -1,6 +1,6 @@
 //! A jitter against the covariance of velocities, and its false-alarm probability.
 
-use super::super::sample::{self, uneven};
+use super::super::sample::{self, STABILITY_KMS, uneven};
 use super::super::{Frequencies, FrequencySettings, Search, SearchSettings};
 use super::*;
 
@@ -11,7 +11,7 @@ fn a_jitter_adds_to_the_covariance() {
     let cycles = uneven(n, 4.0);
     let rv = 0.3 * sample::normal(n, 3);
     let without = sample::correlated(&cycles, &rv, 5);
-    let jitters = Jitters::new(&without, 0.2, f64::INFINITY);
+    let jitters = Jitters::new(&without, 0.2, STABILITY_KMS);
     let covariance = without.information.clone().try_inverse().unwrap();
     let density = |s: f64| {
         let c = &covariance + DMatrix::identity(n, n) * s * s;
@@ -22,7 +22,7 @@ fn a_jitter_adds_to_the_covariance() {
         let inverse = density(0.2 * size).0;
         assert!((&level.quadratic.information - &inverse).norm() < 1e-9 * inverse.norm());
         assert!((&level.quadratic.gradient - &inverse * &rv).norm() < 1e-9 * inverse.norm());
-        let above = ln_l(0.2 * size) - ln_l(0.0);
+        let above = ln_l(0.2 * size) - ln_l(0.0) - (1.0 + (0.2 * size / STABILITY_KMS).powi(2)).ln();
         assert!((level.ln_l - jitters.levels[0].ln_l - above).abs() < 1e-9, "{size}");
         // gradients of a star without a planet: C(s)^-1 C(0.2) C(s)^-1
         let c = &covariance + DMatrix::identity(n, n) * 0.04;
@@ -41,7 +41,7 @@ fn search(n: usize, k_kms: f64, jitter_kms: f64, seed: u64) -> f64 {
     let found_kms = (rv.norm_squared() / n as f64 - 9e-4).max(0.0).sqrt();
     let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
     let settings = SearchSettings { draws: 1000, seed: 1 };
-    let found = Search::with_jitter(&Jitters::new(&without, found_kms, f64::INFINITY), &frequencies, settings).unwrap();
+    let found = Search::with_jitter(&Jitters::new(&without, found_kms, STABILITY_KMS), &frequencies, settings).unwrap();
     found.false_alarm.probability(found.best().orbit.delta_ln_l).value()
 }
 

@@ -1,7 +1,7 @@
 //! Nightly offsets against the covariance of velocities, and the false-alarm probability with them.
 
-use super::super::jitter::{USUAL_STABILITY_KMS, root};
-use super::super::sample;
+use super::super::jitter::root;
+use super::super::sample::{self, STABILITY_KMS};
 use super::super::{Frequencies, FrequencySettings, Search};
 use super::*;
 
@@ -26,8 +26,7 @@ fn found(jitter_kms: f64, night_kms: f64, k_kms: f64, seed: u64) -> Option<(f64,
     let (velocities, nights) = of(jitter_kms, night_kms, k_kms, seed);
     let frequencies = Frequencies::new(&velocities.cycles, 1.0, FrequencySettings::default()).unwrap();
     let found_kms = jitter_kms.hypot(night_kms).hypot(k_kms / std::f64::consts::SQRT_2);
-    let (all, offsets) =
-        beside_offsets(&velocities, &nights, (found_kms, USUAL_STABILITY_KMS), most_offset_kms(USUAL_STABILITY_KMS))?;
+    let (all, offsets) = beside_offsets(&velocities, &nights, (found_kms, STABILITY_KMS))?;
     let search = Search::with_jitter(&all, &frequencies, SearchSettings { draws: 1000, seed: 1 }).unwrap();
     Some((search.false_alarm.probability(search.best().orbit.delta_ln_l).value(), offsets))
 }
@@ -48,12 +47,12 @@ fn the_offsets_add_to_the_covariance() {
     let alone = density(Scatter { jitter_kms: 0.0, night_kms: 0.0 }).0;
     let all = scatters(&[0.0, 0.02], &[0.0, 0.07]);
     assert_eq!(all.len(), 4);
-    let beside = |scatter: &Scatter| Beside::new(&velocities, &nights, *scatter, USUAL_STABILITY_KMS).unwrap();
+    let beside = |scatter: &Scatter| Beside::new(&velocities, &nights, *scatter, STABILITY_KMS).unwrap();
     let (levels, covariance) = levels(&velocities, &beside(&all[2]), all.iter().map(beside).collect());
     let null = density(all[2]).2;
     for (scatter, level) in all.iter().zip(levels) {
         let (ln_l, inverse, _) = density(*scatter);
-        let of = |kms| ln_prior(kms, USUAL_STABILITY_KMS);
+        let of = |kms| ln_prior(kms, STABILITY_KMS);
         let above = ln_l - alone + of(scatter.jitter_kms) + of(scatter.night_kms);
         assert!((beside(scatter).height - above).abs() < 1e-8, "{scatter:?}");
         assert!((&level.quadratic.information - &inverse).norm() < 1e-8 * inverse.norm(), "{scatter:?}");
@@ -88,8 +87,8 @@ fn stars_without_offsets_are_searched_like_those_that_are_drawn() {
     let frequencies = Frequencies::new(&of(0.0, 0.0, 0.0, 0).0.cycles, 1.0, FrequencySettings::default()).unwrap();
     let of_star = |seed: u64| {
         let velocities = of(0.0, 0.0, 0.0, seed).0;
-        let units = nights.units(&velocities, zero, (0.0, most_offset_kms(USUAL_STABILITY_KMS)));
-        (beside(&velocities, &nights, (zero, units), USUAL_STABILITY_KMS).unwrap(), velocities)
+        let units = nights.units(&velocities, zero, (0.0, most_offset_kms(STABILITY_KMS)));
+        (beside(&velocities, &nights, (zero, units), STABILITY_KMS).unwrap(), velocities)
     };
     let (first, velocities) = of_star(0);
     let drawn = FalseAlarm::draw(&first, &frequencies.per_cycle, 4000, 1);
@@ -113,7 +112,7 @@ fn known(night_kms: f64, k_kms: f64, seed: u64) -> Option<NightOffsets> {
     let unit = sample::orbit(&velocities.cycles, 1.0, 1.7, 0.3);
     let found_kms = night_kms.hypot(k_kms / std::f64::consts::SQRT_2);
     let settings = SearchSettings { draws: 2000, seed: 1 };
-    known_beside_offsets(&velocities, &nights, (found_kms, USUAL_STABILITY_KMS), &unit, settings)
+    known_beside_offsets(&velocities, &nights, (found_kms, STABILITY_KMS), &unit, settings)
 }
 
 /// The false-alarm probability of K of such a planet is calibrated.
@@ -152,12 +151,11 @@ fn a_planet_is_no_offset_of_nights() {
 /// Around the planet they are the star's own: without it in the model they absorb it.
 #[test]
 fn offsets_beside_a_planet_do_not_absorb_it() {
-    let most_kms = most_offset_kms(USUAL_STABILITY_KMS);
+    let most_kms = most_offset_kms(STABILITY_KMS);
     let beside = |night_kms: f64, seed: u64| {
         let (mut velocities, nights) = of(0.0, night_kms, 0.15, seed);
         let of = |velocities: &VelocityQuadratic| {
-            most_likely(velocities, &nights, (0.1, USUAL_STABILITY_KMS), most_kms)
-                .map_or(0.0, |(scatter, _)| scatter.night_kms)
+            most_likely(velocities, &nights, (0.1, STABILITY_KMS)).map_or(0.0, |scatter| scatter.night_kms)
         };
         let without = of(&velocities);
         let planet = sample::orbit(&velocities.cycles, -0.15, 1.7, 0.3);
@@ -194,7 +192,7 @@ fn amplitudes_have_the_variance_of_the_gradient() {
     let nights = Nights::new(12, &[(0..2).collect(), (2..9).collect(), (9..12).collect()]).unwrap();
     let of = |night_kms| {
         let scatter = Scatter { jitter_kms: 0.0, night_kms };
-        Beside::new(&velocities, &nights, scatter, USUAL_STABILITY_KMS).unwrap()
+        Beside::new(&velocities, &nights, scatter, STABILITY_KMS).unwrap()
     };
     let (levels, found) = levels(&velocities, &of(0.3), vec![of(0.15)]);
     let of_level = &levels[0].quadratic.information;
@@ -220,9 +218,8 @@ fn without_a_night_the_offsets_stay() {
     // one night is off by 0.3 km/s, and nothing else
     let off = DVector::from_fn(36, |k, _| if k < 3 { 0.3 } else { 0.0 });
     velocities.gradient = &velocities.information * off;
-    let jitter = (0.09, USUAL_STABILITY_KMS);
-    let (all, Offsets { sigma_kms, .. }) =
-        beside_offsets(&velocities, &nights, jitter, most_offset_kms(USUAL_STABILITY_KMS)).unwrap();
+    let jitter = (0.09, STABILITY_KMS);
+    let (all, Offsets { sigma_kms, .. }) = beside_offsets(&velocities, &nights, jitter).unwrap();
     assert!(sigma_kms > 0.03, "{sigma_kms}");
     // profiles are independent here
     let others = VelocityQuadratic {
@@ -231,7 +228,7 @@ fn without_a_night_the_offsets_stay() {
         information: velocities.information.view((3, 3), (33, 33)).into_owned(),
     };
     let nights = nights.of(&others.cycles, &velocities.cycles);
-    let (_, of_others) = beside_offsets(&others, &nights, jitter, most_offset_kms(USUAL_STABILITY_KMS)).unwrap();
+    let (_, of_others) = beside_offsets(&others, &nights, jitter).unwrap();
     assert_eq!(of_others.sigma_kms, 0.0, "the others have no offsets");
     let some = beside_offsets_of(&all, &others, &nights, jitter.1).unwrap();
     assert_eq!((some.null, some.levels.len(), &some.ln_shares), (all.null, all.levels.len(), &all.ln_shares));
