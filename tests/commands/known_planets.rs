@@ -94,6 +94,8 @@ fn offsets_of_nights_leave_two_known_planets_as_they_are() {
     let mut star = config();
     let simulate = &mut star["observations"]["simulate"];
     (simulate["seed"], simulate["random_spots"]["seed"]) = (json!(10), json!(10));
+    // an unstable spectrograph, of which they are expected
+    star["instrument"]["stability_ms"] = json!(1000);
     let desk = Desk::new(star);
     desk.succeed(&["periodogram", "config.json", "--draws", "1000", "--out", "search"]);
     let file = desk.json("search/periodogram.json");
