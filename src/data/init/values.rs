@@ -10,7 +10,7 @@ use crate::data::config::{
 };
 use crate::model::Parameter;
 use crate::numerics::units::instrumental_sigma_kms;
-use crate::planets::periodogram::{Frequencies, FrequencySettings, most_offset_kms, stability_kms};
+use crate::planets::periodogram::{Frequencies, FrequencySettings, USUAL_STABILITY_KMS, most_offset_kms};
 use crate::planets::speeds::with_unit;
 use crate::star::observation::Observations;
 use crate::star::{BrightnessModel, Size};
@@ -302,8 +302,8 @@ impl Values {
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
                 // of static maps none are fitted
                 if draft.imaging.objective.properties().has_field {
-                    let stability_ms = |name: &String| Some(Spectrograph::named(name)?.stability_ms);
-                    let stability_kms = stability_kms(draft.instrument.name.as_ref().and_then(stability_ms));
+                    let of_name = |name: &String| Some(Spectrograph::named(name)?.stability_ms / 1e3);
+                    let stability_kms = draft.instrument.name.as_ref().and_then(of_name).unwrap_or(USUAL_STABILITY_KMS);
                     let most = with_unit(most_offset_kms(stability_kms));
                     let remark = match draft.instrument.name {
                         Some(_) => {

@@ -3,7 +3,7 @@
 use super::chapter::{Table, table};
 use crate::figures::plot::symbols::label;
 use crate::model::Parameter;
-use crate::planets::periodogram::{most_offset_kms, stability_kms};
+use crate::planets::periodogram::{USUAL_STABILITY_KMS, most_offset_kms};
 use crate::planets::speeds::with_unit;
 use crate::surface::calibration::star::mean_and_sd;
 use serde_json::Value;
@@ -68,7 +68,7 @@ pub(super) fn fixed(config: &Value) -> Table {
         let is_idle = evolves && STATIC.contains(pointer);
         if *pointer == NIGHTS && are_nights_fitted(config) {
             let stability_ms = config.pointer("/instrument/stability_ms").and_then(Value::as_f64);
-            let stability_kms = stability_kms(stability_ms);
+            let stability_kms = stability_ms.map_or(USUAL_STABILITY_KMS, |x| x / 1e3);
             let text = format!(
                 "fitted where nights of several profiles show them, up to {}; stability of the spectrograph {}",
                 with_unit(most_offset_kms(stability_kms)),

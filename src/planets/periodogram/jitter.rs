@@ -19,17 +19,8 @@ const BY_CHANCE: f64 = 2.0;
 /// Directions of the gradient with less than this fraction of the largest variance are dropped.
 const STILL: f64 = 1e-13;
 
-/// Stability of a spectrograph that is not named (m/s): that of ESPaDOnS and Narval.
-const USUAL_STABILITY_MS: f64 = 30.0;
-
-/// Least stability in a prior (m/s).
-const LEAST_STABILITY_MS: f64 = 0.1;
-
-/// RV stability of a spectrograph (km/s), given in m/s where it is known: scale of the priors of RV jitter and of RV
-/// offsets of nights.
-pub fn stability_kms(stability_ms: Option<f64>) -> f64 {
-    stability_ms.unwrap_or(USUAL_STABILITY_MS).max(LEAST_STABILITY_MS) / 1e3
-}
+/// RV stability of a spectrograph that is not named (km/s): that of ESPaDOnS and Narval.
+pub const USUAL_STABILITY_KMS: f64 = 0.03;
 
 /// ln of the prior of a jitter or of offsets of nights (km/s) relative to that of none: half-Cauchy, its scale (km/s)
 /// the stability of the spectrograph; the tail admits larger ones where the profiles require them (Gelman 2006,

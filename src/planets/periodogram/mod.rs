@@ -26,7 +26,7 @@ pub use eccentric::KeplerianOrbit;
 pub use false_alarm::FalseAlarm;
 pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
 pub use injections::{Injections, Jitter, OfField};
-pub use jitter::{Jitters, Scatter, ln_prior, stability_kms};
+pub use jitter::{Jitters, Scatter, USUAL_STABILITY_KMS, ln_prior};
 pub use nights::most_offset_kms;
 pub use orbits::{CircularOrbit, Trial};
 pub use peaks::Peak;

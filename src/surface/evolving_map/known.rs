@@ -4,7 +4,7 @@ use super::{Assumed, Marginal};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::model::{Parameter, Prior};
 use crate::numerics::json::is_zero;
-use crate::planets::periodogram::{ln_prior, stability_kms};
+use crate::planets::periodogram::ln_prior;
 use serde::{Deserialize, Serialize};
 
 /// Bounds of amplitude, slope and lifetime (d).
@@ -23,7 +23,7 @@ pub const LARGEST_AMPLITUDE: f64 = 1.0;
 const BREAK_DEGREE: f64 = 7.0;
 
 /// Prior knowledge of the field; parameters that are `None` are fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Known {
     /// Standard deviation of the filling factor.
     pub amplitude: Option<f64>,
@@ -39,8 +39,10 @@ pub struct Known {
     /// RV offsets of nights (km/s), in data sets where their size is not given.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub night_kms: f64,
-    /// RV stability of the spectrograph (km/s): scale of the priors of jitter and offsets of nights.
-    pub stability_kms: f64,
+    /// RV stability of the spectrograph (km/s), where it is known: scale of the prior of the jitter. Without it the
+    /// prior is uniform, as the jitter also takes up what the surface lacks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stability_kms: Option<f64>,
     /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are uniform between the
     /// bounds in ln amplitude, up to usual ones, slope and ln lifetime.
     pub priors: [Option<Prior>; 3],
@@ -76,25 +78,9 @@ impl From<Assumed> for FieldStart {
     }
 }
 
-impl Default for Known {
-    fn default() -> Self {
-        Known {
-            amplitude: None,
-            slope: None,
-            break_degree: None,
-            lifetime: None,
-            jitter_kms: None,
-            night_kms: 0.0,
-            stability_kms: stability_kms(None),
-            priors: [None; 3],
-            start: None,
-        }
-    }
-}
-
 impl Known {
     /// All values as fitted, for a spectrograph of that stability (km/s).
-    pub fn of(marginal: &Marginal, stability_kms: f64) -> Self {
+    pub fn of(marginal: &Marginal, stability_kms: Option<f64>) -> Self {
         let Assumed { field, jitter_kms, night_kms } = marginal.assumed;
         Known {
             amplitude: Some(field.spectrum.amplitude),
@@ -171,7 +157,7 @@ impl Known {
             _ => 0.0,
         };
         let jitter = match self.jitter_kms {
-            None => ln_prior(assumed.jitter_kms, self.stability_kms),
+            None => self.stability_kms.map_or(0.0, |scale| ln_prior(assumed.jitter_kms, scale)),
             Some(_) => 0.0,
         };
         (0..3).filter_map(of).sum::<f64>() + usual + jitter

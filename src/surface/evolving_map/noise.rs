@@ -8,9 +8,9 @@ use super::linearised::linearised;
 use super::{Assumed, Fitted, Known, Marginal};
 use crate::field::FieldError;
 use crate::model::{Elements, ParameterSpace};
-use crate::planets::periodogram::Scatter;
 use crate::planets::periodogram::nights::Nights;
 use crate::planets::periodogram::two_planets::without as without_orbit;
+use crate::planets::periodogram::{Scatter, USUAL_STABILITY_KMS};
 use crate::surface::{At, Linearised, WithoutJitter};
 use std::sync::Arc;
 
@@ -21,7 +21,8 @@ pub(super) fn without(at: At, here: &Linearised, known: &Known) -> Result<Option
     }
     let fitted = here.kept::<Fitted>();
     let Assumed { jitter_kms, night_kms, .. } = fitted.marginal.assumed;
-    let (found_kms, stability_kms) = (jitter_kms.hypot(night_kms), known.stability_kms);
+    let found_kms = jitter_kms.hypot(night_kms);
+    let stability_kms = known.stability_kms.unwrap_or(USUAL_STABILITY_KMS);
     let nights = Nights::new(here.quadratic.len(), &at.imager.nights_of_sets());
     if !fitted.marginal.assumed.has_noise() {
         return Ok(Some(WithoutJitter { here: here.clone(), found_kms, stability_kms, nights }));

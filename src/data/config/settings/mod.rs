@@ -47,8 +47,9 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star without the overrides of data sets.
     pub star: StarSettings,
-    /// RV stability of the spectrograph (km/s): scale of the priors of RV jitter and RV offsets of nights.
-    pub stability_kms: f64,
+    /// RV stability of the spectrograph (km/s), where it is known: scale of the priors of RV jitter and RV offsets of
+    /// nights.
+    pub stability_kms: Option<f64>,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
     /// The parameters as the config gives them: the fixed ones, and the start of the free ones.

@@ -6,7 +6,6 @@ use crate::data::config::instruments::Spectrograph;
 use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, RegionsSection, Star};
 use crate::model::Parameter;
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use crate::planets::periodogram::stability_kms;
 use crate::star::{LimbDarkening, LocalLine, Regions, StarSettings};
 use std::f64::consts::TAU;
 
@@ -15,6 +14,12 @@ const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
 
 /// Least and largest RV stability of a spectrograph (m/s).
 const STABILITIES_MS: [f64; 2] = [0.0, 1e5];
+
+/// Least stability as the scale of a prior (m/s).
+const LEAST_MS: f64 = 0.1;
+
+/// Metres in a kilometre.
+const M_PER_KM: f64 = 1e3;
 
 /// Longest name of a star or a spectrograph (characters).
 const LONGEST_NAME: usize = 80;
@@ -31,8 +36,8 @@ fn check_name(key: &str, name: &str) -> Result<(), Fault> {
     Err(Fault::new(key, problem))
 }
 
-/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s).
-pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<f64, Fault> {
+/// Fills in what the name of the spectrograph gives, and returns its RV stability (km/s) where known.
+pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<Option<f64>, Fault> {
     const NAME: &str = "instrument.name";
     if let Some(name) = &instrument.name {
         check_name(NAME, name)?;
@@ -48,10 +53,9 @@ pub(super) fn resolve_instrument(instrument: &mut Instrument) -> Result<f64, Fau
             }
         }
     }
-    if let Some(stability_ms) = instrument.stability_ms {
-        within("instrument.stability_ms", stability_ms, STABILITIES_MS)?;
-    }
-    Ok(stability_kms(instrument.stability_ms))
+    let Some(stability_ms) = instrument.stability_ms else { return Ok(None) };
+    within("instrument.stability_ms", stability_ms, STABILITIES_MS)?;
+    Ok(Some(stability_ms.max(LEAST_MS) / M_PER_KM))
 }
 
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`.
