@@ -176,7 +176,7 @@ pub struct Instrument {
     pub resolving_power: Option<f64>,
     /// RV stability (m/s), from 0 to 1e5: scale of the half-Cauchy priors of RV jitter and night-to-night RV offsets,
     /// and half of the largest standard deviation of such offsets that searches, chains and limits fit. If not given,
-    /// that of the named spectrograph; without a name, 30.
+    /// that of the named spectrograph; without a name, searches take 30.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stability_ms: Option<f64>,
 }
