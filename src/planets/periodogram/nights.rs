@@ -188,7 +188,7 @@ pub fn with_noise(without: &VelocityQuadratic, nights: &Nights, noise: Scatter) 
     Some(Beside::new(without, nights, noise, f64::INFINITY)?.likelihood(without))
 }
 
-/// The same with offsets of any size. `None` where zero offsets are the most likely without a planet.
+/// As [`beside_offsets`], of any size. `None` where zero offsets are the most likely without a planet.
 fn beside_needed(without: &VelocityQuadratic, nights: &Nights, jitter: (f64, f64)) -> Option<(Jitters, Offsets)> {
     beside_up_to(f64::INFINITY, without, nights, jitter).filter(|(_, offsets)| offsets.sigma_kms > 0.0)
 }

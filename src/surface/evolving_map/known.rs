@@ -186,3 +186,23 @@ impl Known {
         [self.amplitude.is_none(), self.slope.is_none(), lives, jitters]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A jitter takes up what the surface lacks, unless the spectrograph is known to be stable.
+    #[test]
+    fn a_jitter_has_a_prior_where_the_spectrograph_is_known() {
+        let kernel = Kernel::of(Lifetime::Static);
+        let spectrum = Spectrum { amplitude: 0.2, slope: 1.0, break_degree: 0.0 };
+        let of = |known: Known| {
+            let height = |jitter_kms| {
+                known.log_prior(&Assumed { field: Field { spectrum, kernel }, jitter_kms, night_kms: 0.0 })
+            };
+            height(0.06) - height(0.0)
+        };
+        assert_eq!(of(Known::default()), 0.0);
+        assert!((of(Known { stability_kms: Some(0.03), ..Known::default() }) + 5f64.ln()).abs() < 1e-12);
+    }
+}
